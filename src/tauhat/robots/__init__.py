@@ -1,0 +1,31 @@
+"""Robot descriptions: the kinematic tree with limits and nominal inertias, and where it comes from."""
+
+from tauhat.robots.dh import robot_from_dh
+from tauhat.robots.inertia_checks import inertia_defect
+from tauhat.robots.joint import Joint, JointKind, Limits, central_inertia, inertia_at_origin
+from tauhat.robots.kinematics import Pose, forward_kinematics, pinocchio_model
+from tauhat.robots.library import builtin_names, describe_builtins, load_robot
+from tauhat.robots.locking import lock_joints
+from tauhat.robots.robot import EARTH, Frame, Robot
+from tauhat.robots.urdf import robot_from_urdf
+
+__all__ = [
+    "EARTH",
+    "Frame",
+    "Joint",
+    "JointKind",
+    "Limits",
+    "Pose",
+    "Robot",
+    "builtin_names",
+    "central_inertia",
+    "describe_builtins",
+    "forward_kinematics",
+    "inertia_at_origin",
+    "inertia_defect",
+    "load_robot",
+    "lock_joints",
+    "pinocchio_model",
+    "robot_from_dh",
+    "robot_from_urdf",
+]
