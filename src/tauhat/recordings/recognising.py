@@ -1,0 +1,104 @@
+"""Logs without a map: plain column names are recognised, others get a map to fill in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tauhat.errors import MapError
+from tauhat.recordings.logmap import KINDS, LogMap, SignalMap, TimeMap
+from tauhat.recordings.table import Table, compact_names
+from tauhat.recordings.tables import open_table
+
+_CLOCKS = ("t", "time", "t_s", "time_s")
+_STEMS = {
+    "position": ("q_", "q"),
+    "velocity": ("dq_", "dq"),
+    "acceleration": ("ddq_", "ddq"),
+    "torque": ("tau_", "tau"),
+    "temperature": ("temperature_", "temperature"),
+}
+_WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+def recognise(table: Table) -> LogMap:
+    """Return the map of a file with plain names: t or time, q_1 .. or q1 .., dq_1 .., ddq_1 .., tau_1 .., fx .. mz.
+
+    Raises
+    ------
+    MapError
+        other names; the message lists them and shows a map to start from.
+    """
+    clock = next((name for name in _CLOCKS if name in table.groups), None)
+    signals: dict[str, Any] = {kind: _plain(table, kind) for kind in KINDS}
+    if clock is None or signals["position"] is None:
+        raise MapError(
+            "no map, and no plain column names (t, q_1, q_2, ...)", where=table.path,
+            got=table.listing() or f"{table.width} columns without names",
+            remedy=f"write {_map_name(table.path)}, a section per line: {_one_line(skeleton(table))}",
+        )  # fmt: skip
+    return LogMap(time=TimeMap(column=clock), **signals)
+
+
+def map_skeleton(path: str | Path) -> str:
+    """Return the text of a map to start from, with the columns that a log has.
+
+    Raises
+    ------
+    RecordingError
+        a file that cannot be read.
+    """
+    return skeleton(open_table(path))
+
+
+def skeleton(table: Table) -> str:
+    """Return the text of a map to start from for an opened file."""
+    clock, *others = _guesses(table)
+    lines = ["[time]", f"column = {clock}", 'unit = "s"  # or ms, us, ns']
+    for kind, columns in zip(("position", "velocity", "torque"), others, strict=False):
+        unit = {"torque": '"Nm"  # or A, V, count with gain = [...]'}.get(
+            kind, '"rad"  # or deg, count with scale = [...]'
+        )
+        lines += ["", f"[{kind}]", f"columns = {columns}", f"unit = {unit}"]
+    return "\n".join(lines) + "\n"
+
+
+def _plain(table: Table, kind: str) -> SignalMap | None:
+    if kind == "wrench":
+        names: tuple[str, ...] = ("wrench",) if len(table.groups.get("wrench", ())) == 6 else _WRENCH
+        return SignalMap(kind=kind, columns=names) if all(name in table.groups for name in names) else None
+    for stem in _STEMS[kind]:
+        names = _numbered(table, stem)
+        if names:
+            return SignalMap(kind=kind, columns=names)
+    whole = _STEMS[kind][-1]
+    return SignalMap(kind=kind, columns=(whole,)) if whole in table.groups else None
+
+
+def _numbered(table: Table, stem: str) -> tuple[str, ...]:
+    names: list[str] = []
+    while f"{stem}{len(names) + 1}" in table.groups:
+        names.append(f"{stem}{len(names) + 1}")
+    return tuple(names)
+
+
+def _guesses(table: Table) -> list[str]:
+    """Return TOML values for the clock, then for the position, velocity and torque columns."""
+    if not table.groups:
+        joints = max(1, (table.width - 1) // 3)
+        spans = [(1 + k * joints, (k + 1) * joints) for k in range(3) if (k + 1) * joints < table.width]
+        return ["0", *(f'"{{{first}..{last}}}"' for first, last in spans or [(0, 0)])]
+    runs = compact_names(tuple(name for name in table.groups if not name.endswith("]")))
+    quoted = [f'"{run}"' for run in runs]
+    wide = [text for text, run in zip(quoted, runs, strict=True) if "{" in run or len(table.groups.get(run, ())) > 1]
+    clock = next((text for text, run in zip(quoted, runs, strict=True) if run.lower().startswith("t")), quoted[0])
+    return [clock, *(wide or [text for text in quoted if text != clock] or quoted)[:3]]
+
+
+def _map_name(path: Path) -> str:
+    return f"{path.name.split('.')[0]}.map.toml"
+
+
+def _one_line(text: str) -> str:
+    lines = [line.split("  #")[0] for line in text.splitlines() if line]
+    return " / ".join(lines)
