@@ -1,0 +1,154 @@
+"""The torque model: a robot plus the terms that make its torque."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, IntArray
+from tauhat.dynamics.motion import Motion
+from tauhat.dynamics.terms import Coulomb, Inertia, Offset, Parameter, RotorInertia, Term, Viscous
+from tauhat.errors import ModelError
+from tauhat.robots.robot import Robot
+
+TERMS: Mapping[str, type[Term]] = {term.key: term for term in (Inertia, RotorInertia, Viscous, Coulomb, Offset)}
+PLAIN_TERMS = ("inertia", "rotor", "viscous", "coulomb", "offset")
+
+TermStates = tuple[FloatArray | None, ...]
+
+
+class Layout(NamedTuple):
+    """Which regressor entries are kept as rows, joint by joint.
+
+    parameters : (n_rows,) index of each row's parameter in the model
+    bounds : (n_v + 1,) rows of joint j are `bounds[j]` to `bounds[j + 1]`
+    sources : per term and joint, which of its support columns go to which rows
+    """
+
+    parameters: IntArray
+    bounds: IntArray
+    sources: tuple[tuple[tuple[IntArray, IntArray], ...], ...]
+
+    def of_joint(self, joint: int) -> slice:
+        """Return the rows of one joint."""
+        return slice(int(self.bounds[joint]), int(self.bounds[joint + 1]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TorqueModel:
+    """A robot and its terms: the columns of `tau = Y(q, dq, ddq) x`.
+
+    robot : the arm
+    terms : each kind at most once
+    """
+
+    robot: Robot
+    terms: tuple[Term, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "terms", tuple(self.terms))
+        keys = [term.key for term in self.terms]
+        if not keys:
+            raise ModelError("a torque model needs at least one term", expected=", ".join(TERMS))
+        if len(set(keys)) < len(keys):
+            raise ModelError("a term is given twice", got=", ".join(keys))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, term by term."""
+        return tuple(parameter for term in self.terms for parameter in term.parameters(self.robot))
+
+    @property
+    def n_p(self) -> int:
+        """Number of standard parameters."""
+        return len(self.parameters)
+
+    def layout(self, kept: IntArray | None = None) -> Layout:
+        """Return where each regressor entry goes when only the parameters `kept` (all by default) are wanted."""
+        wanted = np.arange(self.n_p) if kept is None else np.asarray(kept, dtype=np.intp)
+        rank = np.full(self.n_p, -1)
+        rank[wanted] = np.arange(wanted.size)
+        supports = [term.support(self.robot) for term in self.terms]
+        starts = np.cumsum([0, *(len(term.parameters(self.robot)) for term in self.terms)])
+        rows: list[IntArray] = []
+        bounds = [0]
+        sources: list[list[tuple[IntArray, IntArray]]] = [[] for _ in self.terms]
+        for joint in range(self.robot.n_v):
+            columns = [supports[k][joint] + starts[k] for k in range(len(self.terms))]
+            present = np.sort(np.concatenate([c[rank[c] >= 0] for c in columns]))
+            position = {int(parameter): bounds[-1] + r for r, parameter in enumerate(present)}
+            for k, column in enumerate(columns):
+                picked = np.flatnonzero(rank[column] >= 0)
+                target = np.array([position[int(c)] for c in column[picked]], dtype=np.intp)
+                sources[k].append((picked, target))
+            rows.append(present)
+            bounds.append(bounds[-1] + present.size)
+        return Layout(np.concatenate(rows), np.array(bounds), tuple(tuple(source) for source in sources))
+
+    def columns(
+        self, motion: Motion, layout: Layout, states: TermStates | None = None
+    ) -> tuple[FloatArray, TermStates]:
+        """Return the regressor entries of `layout`, (n_rows, n_t), and the terms' states behind the last sample.
+
+        Pass the states on to the next stretch of the same recording; None starts a new one.
+        """
+        before = states if states is not None else (None,) * len(self.terms)
+        out = np.empty((layout.parameters.size, motion.n_t))
+        after: list[FloatArray | None] = []
+        for term, state, sources in zip(self.terms, before, layout.sources, strict=True):
+            columns, state_after = term.columns(self.robot, motion, state)
+            after.append(state_after)
+            for (picked, target), values in zip(sources, columns, strict=True):
+                out[target] = values[picked]
+        return out, tuple(after)
+
+    def with_term(self, term: Term) -> TorqueModel:
+        """Return the model with the term of the same kind replaced."""
+        return replace(self, terms=tuple(term if other.key == term.key else other for other in self.terms))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return robot and terms as plain data."""
+        terms = [{"term": term.key, **asdict(term)} for term in self.terms]
+        return {"robot": self.robot.to_dict(), "terms": terms}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> TorqueModel:
+        """Return the model that `to_dict` described.
+
+        Raises
+        ------
+        ModelError
+            when a term is unknown or its settings are not.
+        """
+        terms = tuple(_term_from_dict(item) for item in data["terms"])
+        return cls(robot=Robot.from_dict(data["robot"]), terms=terms)
+
+
+def _term_from_dict(data: Mapping[str, Any]) -> Term:
+    settings = {name: value for name, value in data.items() if name != "term"}
+    key = str(data.get("term"))
+    if key not in TERMS:
+        raise ModelError("unknown term", expected=", ".join(TERMS), got=key)
+    try:
+        return TERMS[key](**settings)
+    except TypeError as error:
+        raise ModelError(f"term {key} has other settings in this version", got=", ".join(settings)) from error
+
+
+def torque_model(robot: Robot, terms: str | Iterable[str] = PLAIN_TERMS) -> TorqueModel:
+    """Return the model with the named terms, e.g. `"inertia,rotor,viscous,coulomb,offset"`, in their default settings.
+
+    Raises
+    ------
+    ModelError
+        when a name is unknown or given twice.
+    """
+    names = terms.split(",") if isinstance(terms, str) else list(terms)
+    keys = [name.strip() for name in names]
+    unknown = [key for key in keys if key not in TERMS]
+    if unknown:
+        raise ModelError("unknown term", expected=", ".join(TERMS), got=", ".join(unknown))
+    return TorqueModel(robot=robot, terms=tuple(TERMS[key]() for key in keys))

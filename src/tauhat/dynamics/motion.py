@@ -1,0 +1,59 @@
+"""Motion in kernel layout: joints first, samples last, so that the compiler vectorises across samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauhat.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """A stretch of motion, `(n_v, n_t)` each, uniform in time.
+
+    q, dq, ddq : position, velocity, acceleration [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
+    step : time between samples [s]
+    load : rigid-body torque of a previous pass [Nm or N], for terms with iterated columns
+    """
+
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    step: float = 0.0
+    load: FloatArray | None = None
+
+    @property
+    def n_v(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[0])
+
+    @property
+    def n_t(self) -> int:
+        """Number of samples."""
+        return int(self.q.shape[1])
+
+    def kernel_input(self) -> FloatArray:
+        """Return (5, n_v, n_t): cos q, sin q, q, dq, ddq."""
+        packed = np.empty((5, *self.q.shape))
+        packed[2], packed[3], packed[4] = self.q, self.dq, self.ddq
+        np.cos(packed[2], out=packed[0])
+        np.sin(packed[2], out=packed[1])
+        return packed
+
+    def samples(self, start: int, stop: int) -> Motion:
+        """Return samples `start` to `stop`, end excluded."""
+        load = None if self.load is None else self.load[:, start:stop]
+        return Motion(
+            q=self.q[:, start:stop], dq=self.dq[:, start:stop], ddq=self.ddq[:, start:stop], step=self.step, load=load
+        )
+
+
+def motion_from_rows(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Motion:
+    """Return a motion from time-first arrays `(n_t, n_v)`."""
+    return Motion(q=_joint_first(q), dq=_joint_first(dq), ddq=_joint_first(ddq))
+
+
+def _joint_first(rows: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(np.asarray(rows, dtype=np.float64).T)
