@@ -1,0 +1,194 @@
+"""Evidence: a log boiled down to what a least-squares problem can ever learn from it.
+
+For joint j the stacked equation is `W_j x = tau_j`. The triangular factor `[R_j z_j; 0 r_j] = qr([W_j tau_j])` is a
+sufficient statistic of at most (p_j + 1)^2 numbers, whatever the log's length, and two factors merge by one small QR.
+
+The factors are kept for a bounded number of consecutive blocks of time rather than for the whole log: residuals of real
+robots are correlated in time, and blocks longer than that correlation are what honest standard errors and
+cross-validation can be made of. When there are too many blocks, neighbours merge; memory stays constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, IntArray
+from tauhat.dynamics.base import BaseParameters
+from tauhat.dynamics.model import Layout, TorqueModel
+from tauhat.errors import ModelError
+from tauhat.estimation.rows import Rows, filtered_rows
+from tauhat.recordings.processing import CHUNK, Processing
+from tauhat.recordings.recording import Recording
+
+MOST_BLOCKS = 64
+_FIRST_ROWS = 8  # rows of a block before the first merges; blocks grow with the log
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Block:
+    """Factors of one stretch of time.
+
+    factors : per joint (k, p_j + 1), k <= p_j + 1 after reduction; the last column is the torque
+    n_t : number of rows that went in, per joint
+    """
+
+    factors: tuple[FloatArray, ...]
+    n_t: int
+
+    def merged(self, other: Block) -> Block:
+        """Return the block of both stretches."""
+        pairs = zip(self.factors, other.factors, strict=True)
+        return Block(factors=tuple(_reduced(np.vstack(pair)) for pair in pairs), n_t=self.n_t + other.n_t)
+
+    def reduced(self) -> Block:
+        """Return the same block with every factor no taller than wide."""
+        return Block(factors=tuple(_reduced(factor) for factor in self.factors), n_t=self.n_t)
+
+
+def _reduced(rows: FloatArray) -> FloatArray:
+    """Return a factor with the same Gram matrix and no more rows than columns."""
+    if rows.shape[0] <= rows.shape[1]:
+        return rows
+    from scipy.linalg.lapack import dgeqrf
+
+    packed, _, _, _ = dgeqrf(rows)
+    return np.ascontiguousarray(np.triu(packed[: rows.shape[1]]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Evidence:
+    """What recordings say about a model's kept parameters.
+
+    supports : per joint, which of the `n_b` kept parameters load it, (p_j,)
+    n_b : number of kept parameters
+    blocks : consecutive stretches of time, at most 64
+    recordings : names of the recordings inside
+    """
+
+    supports: tuple[IntArray, ...]
+    n_b: int
+    blocks: tuple[Block, ...]
+    recordings: tuple[str, ...] = ()
+
+    @property
+    def n_v(self) -> int:
+        """Number of joints."""
+        return len(self.supports)
+
+    @property
+    def n_t(self) -> int:
+        """Number of rows per joint."""
+        return sum(block.n_t for block in self.blocks)
+
+    @property
+    def total(self) -> Block:
+        """The factors of all blocks together."""
+        return _tree(self.blocks)
+
+    def merged(self, other: Evidence) -> Evidence:
+        """Return the evidence of both; any order of merging gives the same estimate.
+
+        Raises
+        ------
+        ModelError
+            when the two belong to different models.
+        """
+        same = self.n_b == other.n_b and len(self.supports) == len(other.supports)
+        if not same or any(not np.array_equal(a, b) for a, b in zip(self.supports, other.supports, strict=True)):
+            raise ModelError("evidence of different models cannot be merged")
+        blocks = (*self.blocks, *other.blocks)
+        while len(blocks) > MOST_BLOCKS:
+            blocks = _halved(blocks)
+        return replace(self, blocks=blocks, recordings=(*self.recordings, *other.recordings))
+
+    def without(self, block: int) -> Evidence:
+        """Return the evidence without one block of time."""
+        return replace(self, blocks=self.blocks[:block] + self.blocks[block + 1 :])
+
+
+def _tree(blocks: tuple[Block, ...]) -> Block:
+    while len(blocks) > 1:
+        blocks = _halved(blocks)
+    return blocks[0]
+
+
+def _halved(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
+    pairs = [blocks[k].merged(blocks[k + 1]) for k in range(0, len(blocks) - 1, 2)]
+    return (*pairs, blocks[-1]) if len(blocks) % 2 else tuple(pairs)
+
+
+def collect(
+    model: TorqueModel, base: BaseParameters, recording: Recording, processing: Processing, *, chunk: int = CHUNK
+) -> Evidence:
+    """Return the evidence of one recording on the model's base parameters, in constant memory.
+
+    Raises
+    ------
+    RecordingError
+        when the recording does not fit the model or no row is left.
+    """
+    layout = model.layout(base.independent)
+    rows = filtered_rows(model, layout, recording, processing, chunk=chunk)
+    return evidence_from_rows(layout, base, rows, name=recording.name)
+
+
+def evidence_from_rows(layout: Layout, base: BaseParameters, rows: Iterable[Rows], *, name: str = "rows") -> Evidence:
+    """Return the evidence of a stream of rows."""
+    place = np.full(len(base.names), -1)
+    place[base.independent] = np.arange(base.n_b)
+    n_v = layout.bounds.size - 1
+    supports = tuple(place[layout.parameters[layout.of_joint(joint)]] for joint in range(n_v))
+    blocks = tuple(_grown_blocks(layout, rows))
+    if not blocks:
+        raise ModelError("no row of the recording is left to identify from", where=name)
+    return Evidence(supports=supports, n_b=base.n_b, blocks=blocks, recordings=(name,))
+
+
+def _grown_blocks(layout: Layout, rows: Iterable[Rows]) -> list[Block]:
+    """Cut the stream into blocks of equal length; when there are too many, merge neighbours and double the length."""
+    size = _FIRST_ROWS
+    done: list[Block] = []
+    open_block: Block | None = None
+    for piece in rows:
+        start = 0
+        while start < piece.t.size:
+            room = size - (open_block.n_t if open_block else 0)
+            part = _block(layout, piece, start, min(start + room, piece.t.size))
+            start += part.n_t
+            open_block = part if open_block is None else open_block.merged(part)
+            if open_block.n_t >= size:
+                done.append(open_block.reduced())
+                open_block = None
+            if len(done) == MOST_BLOCKS:
+                done = list(_halved(tuple(done)))
+                size *= 2
+    if open_block is not None:
+        done = _with_rest(done, open_block.reduced(), size)
+    return done
+
+
+def _with_rest(done: list[Block], rest: Block, size: int) -> list[Block]:
+    if done and rest.n_t < size // 2:
+        return [*done[:-1], done[-1].merged(rest)]
+    return [*done, rest]
+
+
+def _block(layout: Layout, piece: Rows, start: int, stop: int) -> Block:
+    factors = []
+    for joint in range(piece.tau.shape[0]):
+        columns = piece.columns[layout.of_joint(joint), start:stop]
+        stacked = np.concatenate([columns, piece.tau[joint : joint + 1, start:stop]])
+        factors.append(stacked.T)
+    return Block(factors=tuple(factors), n_t=stop - start)
+
+
+def collect_all(
+    model: TorqueModel, base: BaseParameters, recordings: Iterable[Recording], processing: Processing
+) -> Evidence:
+    """Return the merged evidence of several recordings."""
+    parts: Iterator[Evidence] = (collect(model, base, recording, processing) for recording in recordings)
+    return reduce(Evidence.merged, parts)

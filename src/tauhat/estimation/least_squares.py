@@ -1,0 +1,128 @@
+"""Ordinary and weighted least squares on evidence alone: no second pass over the data."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from tauhat.arrays import FloatArray
+from tauhat.errors import ModelError
+from tauhat.estimation.evidence import Evidence
+from tauhat.estimation.solution import Solution, honest_covariance, joint_residuals, joint_torques, solve
+
+
+class Solved(NamedTuple):
+    """Values and weights of a solve, without error bars; rank and condition are of the scaled regressor."""
+
+    values: FloatArray
+    weights: FloatArray
+    rank: int
+    condition: float
+    passes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimator(ABC):
+    """A method that turns evidence into parameter values.
+
+    ridge : pull of the column-scaled parameters to zero (0: none)
+    """
+
+    key: ClassVar[str]
+    ridge: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.ridge < np.inf:
+            raise ModelError("the ridge cannot be negative", got=self.ridge)
+
+    @abstractmethod
+    def solve(self, evidence: Evidence) -> Solved:
+        """Return values alone, the quick part of `fit`."""
+
+    def fit(self, evidence: Evidence) -> Solution:
+        """Return values, covariance and diagnostics."""
+        solved = self.solve(evidence)
+        blocks, rows = len(evidence.blocks), evidence.n_v * evidence.n_t
+        return Solution(
+            values=solved.values,
+            covariance=honest_covariance(evidence, solved.weights, solved.values, ridge=self.ridge),
+            weights=solved.weights,
+            joint_rms=joint_residuals(evidence, solved.values),
+            torque_rms=joint_torques(evidence),
+            rank=solved.rank,
+            condition=solved.condition,
+            degrees=blocks - 1 if blocks > 1 else max(1, rows - evidence.n_b),
+            passes=solved.passes,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrdinaryLeastSquares(Estimator):
+    """Every joint's equation counts alike, in newton metres.
+
+    Source: Khalil, Dombre, "Modeling, identification and control of robots", 2002, ch. 12.
+    """
+
+    key: ClassVar[str] = "ols"
+
+    def solve(self, evidence: Evidence) -> Solved:
+        """Return the solution with unit weights."""
+        weights = np.ones(evidence.n_v)
+        values, rank, condition = solve(evidence, weights, ridge=self.ridge)
+        return Solved(values, weights, rank, condition, 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WeightedLeastSquares(Estimator):
+    """Each joint's equation is divided by the size of its own residual, to a power, and solved again.
+
+    power : 1 makes every joint matter alike relative to its noise (the textbook's choice); 0.5 is between that and
+        newton metres and predicts the stacked torque best on real logs
+    passes : how often weights and solution follow each other
+
+    Source: Gautier, "Dynamic identification of robots with power model", 1997; power: measured on real logs.
+    """
+
+    key: ClassVar[str] = "wls"
+    power: float = 0.5
+    passes: int = 3
+
+    def __post_init__(self) -> None:
+        super(WeightedLeastSquares, self).__post_init__()
+        if not 0.0 <= self.power <= 2.0:
+            raise ModelError("power of the joint weights out of range", expected="0 to 2", got=self.power)
+        if self.passes < 1:
+            raise ModelError("at least one pass is needed", got=self.passes)
+
+    def solve(self, evidence: Evidence) -> Solved:
+        """Return the solution after the last pass."""
+        weights = np.ones(evidence.n_v)
+        values, rank, condition = solve(evidence, weights, ridge=self.ridge)
+        for _ in range(self.passes):
+            weights = self._weights(evidence, values)
+            values, rank, condition = solve(evidence, weights, ridge=self.ridge)
+        return Solved(values, weights, rank, condition, self.passes + 1)
+
+    def _weights(self, evidence: Evidence, values: FloatArray) -> FloatArray:
+        residual, torque = joint_residuals(evidence, values), joint_torques(evidence)
+        floor = max(1e-6 * torque.max(), np.finfo(float).tiny)
+        return np.asarray(np.maximum(residual, floor) ** -self.power)
+
+
+ESTIMATORS: dict[str, type[Estimator]] = {method.key: method for method in (OrdinaryLeastSquares, WeightedLeastSquares)}
+
+
+def estimator_named(key: str) -> Estimator:
+    """Return the estimator of this name in its default settings.
+
+    Raises
+    ------
+    ModelError
+        when there is none.
+    """
+    if key not in ESTIMATORS:
+        raise ModelError("unknown estimator", expected=", ".join(ESTIMATORS), got=key)
+    return ESTIMATORS[key]()

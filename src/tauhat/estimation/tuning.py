@@ -1,0 +1,113 @@
+"""Settings that only the recordings can tell: filters, source of velocity, delay, shapes of terms.
+
+Each is chosen by the residual that the model leaves on the recordings that are fitted, over a short list of candidates;
+none of them adds a free parameter. Judged is the mean over the joints of the logarithm of the residual, so that a small
+joint counts as much as a large one.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tauhat.dynamics.base import BaseParameters, base_parameters
+from tauhat.dynamics.model import TorqueModel
+from tauhat.errors import TauhatWarning
+from tauhat.estimation.delay import position_delay
+from tauhat.estimation.evidence import collect_all
+from tauhat.estimation.least_squares import WeightedLeastSquares
+from tauhat.estimation.solution import joint_residuals
+from tauhat.recordings.choice import MOTION_CUTOFF, choose_processing, top_speeds
+from tauhat.recordings.processing import Processing
+from tauhat.recordings.recording import Recording
+
+MOST_SAMPLES = 60_000  # settings are chosen on so many samples at most
+_LEAST_GAIN = 0.005  # a candidate must leave that much less residual to replace the default
+
+
+def tuned(
+    model: TorqueModel,
+    recordings: Sequence[Recording],
+    *,
+    processing: Processing | None = None,
+    cutoff: float | None = None,
+) -> tuple[TorqueModel, Processing]:
+    """Return the model with its shapes chosen, and the processing for it.
+
+    Parameters
+    ----------
+    processing : taken as it is when given; only shapes of terms are then chosen
+    cutoff : low-pass of torque and columns [Hz]; chosen from the spectrum by default
+
+    Warns
+    -----
+    TauhatWarning
+        when the position is late against the torque and that is compensated.
+    """
+    sample = _shortened(recordings)
+    base = base_parameters(model)
+    if processing is not None:
+        return _shaped(model, base, sample, processing), processing
+    settings = choose_processing(recordings, cutoff=cutoff)
+    shaped = _shaped(model, base, sample, settings)
+    delay = position_delay(shaped, base, sample, settings)
+    if delay.certain:
+        settings = replace(settings, delay=delay.seconds)
+        warnings.warn(
+            f"position is logged {delay.seconds * 1e3:.2g} ms ({delay.samples:.2g} samples) late against the torque: "
+            "compensated",
+            TauhatWarning,
+            stacklevel=3,
+        )
+    settings = _best_processing(shaped, base, sample, settings)
+    return _shaped(model, base, sample, settings), settings
+
+
+def residual_level(
+    model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], processing: Processing
+) -> float:
+    """Return the mean logarithm of the joints' residuals after a weighted fit: what candidates are judged by."""
+    evidence = collect_all(model, base, recordings, processing)
+    residuals = joint_residuals(evidence, WeightedLeastSquares(passes=1).solve(evidence).values)
+    return float(np.mean(np.log(np.maximum(residuals, np.finfo(float).tiny))))
+
+
+def _shortened(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Return the leading part of each recording, in proportion, `MOST_SAMPLES` in all."""
+    share = min(1.0, MOST_SAMPLES / sum(recording.n_t for recording in recordings))
+    return tuple(
+        recording if share == 1.0 else recording.rows(0, max(1000, int(share * recording.n_t)))
+        for recording in recordings
+    )
+
+
+def _shaped(
+    model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], processing: Processing
+) -> TorqueModel:
+    tops = top_speeds(recordings)
+    for term in model.terms:
+        forms = [model.with_term(form) for form in term.candidates(tops)]
+        if len(forms) > 1:
+            levels = [residual_level(form, base, recordings, processing) for form in forms]
+            model = forms[int(np.argmin(levels))]
+    return model
+
+
+def _best_processing(
+    model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], default: Processing
+) -> Processing:
+    """Return the best source of velocity and cut-off of the position; the default unless another is clearly better."""
+    narrow = default.motion_cutoff / MOTION_CUTOFF
+    candidates = [replace(default, motion_cutoff=narrow)]
+    if all(recording.dq is not None for recording in recordings):
+        candidates += [replace(default, velocity="velocity")]
+        candidates += [replace(default, velocity="velocity", motion_cutoff=narrow)]
+    best, level = default, residual_level(model, base, recordings, default) - _LEAST_GAIN
+    for candidate in candidates:
+        other = residual_level(model, base, recordings, candidate)
+        if other < level:
+            best, level = candidate, other
+    return best

@@ -1,0 +1,165 @@
+"""Identification recovers what is known, and says when it cannot."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from sample_arms import chain, planar_arm, planar_truth, smooth_motion
+from tauhat.dynamics import inverse_dynamics, torque_model
+from tauhat.errors import ModelError, RecordingError, TauhatWarning
+from tauhat.estimation import OrdinaryLeastSquares, WeightedLeastSquares, estimator_named, identify
+from tauhat.recordings.processing import Processing
+from tauhat.recordings.recording import Recording, Source
+
+SETTINGS = Processing(cutoff=10.0, motion_cutoff=30.0)
+TRUTH = planar_truth()
+METHODS = (OrdinaryLeastSquares(), WeightedLeastSquares(), WeightedLeastSquares(power=1.0, passes=5))
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+def test_known_parameters_come_back_from_a_clean_recording(method):
+    estimate = identify(TRUTH.model, [TRUTH.recording()], estimator=method, processing=SETTINGS)
+    expected = estimate.base.projection @ TRUTH.standard
+    assert np.allclose(estimate.values, expected, rtol=0, atol=2e-3 * np.abs(expected).max())
+    assert estimate.relative_rms < 2e-3
+
+
+@pytest.mark.parametrize("method", METHODS, ids=str)
+def test_known_parameters_are_within_their_99_percent_interval(method):
+    noise = np.random.default_rng(1).normal(size=(4000, 2)) * [0.8, 0.2]
+    estimate = identify(TRUTH.model, [TRUTH.recording(noise=noise)], estimator=method, processing=SETTINGS)
+    error = estimate.values - estimate.base.projection @ TRUTH.standard
+    assert (np.abs(error) < student.ppf(0.995, estimate.degrees) * estimate.standard_errors).all()
+    assert (estimate.standard_errors < 0.1).all()
+
+
+def test_weighting_helps_when_one_joint_is_noisy():
+    errors = {"ols": [], "wls": []}
+    for seed in range(8):
+        noise = np.random.default_rng(seed).normal(size=(4000, 2)) * [5.0, 0.05]
+        for method in (OrdinaryLeastSquares(), WeightedLeastSquares(power=1.0)):
+            estimate = identify(TRUTH.model, [TRUTH.recording(noise=noise)], estimator=method, processing=SETTINGS)
+            error = estimate.values - estimate.base.projection @ TRUTH.standard
+            errors[method.key].append(error[estimate.base.formulas().index("Izz_2")])
+    assert np.std(errors["wls"]) < 0.5 * np.std(errors["ols"])
+
+
+def test_spatial_arm_with_a_slide_is_recovered():
+    robot = chain(np.random.default_rng(2), "RPR")
+    t = np.arange(0, 20, 0.005)
+    q, dq, ddq = smooth_motion(3, t)
+    recording = Recording(t=t, q=q, tau=inverse_dynamics(robot, q, dq, ddq))
+    estimate = identify(torque_model(robot, "inertia"), [recording], processing=SETTINGS)
+    expected = estimate.base.projection @ robot.inertia.ravel()
+    assert np.allclose(estimate.values, expected, rtol=0, atol=5e-3 * np.abs(expected).max())
+
+
+def test_two_recordings_know_more_than_one():
+    def errors(count):
+        noises = [np.random.default_rng(seed).normal(size=(4000, 2)) for seed in range(count)]
+        runs = [TRUTH.recording(seed=seed, noise=noise) for seed, noise in enumerate(noises)]
+        return identify(TRUTH.model, runs, processing=SETTINGS).standard_errors
+
+    assert np.median(errors(4) / errors(1)) < 0.75
+
+
+def test_estimate_tells_what_it_was_made_of():
+    source = Source(path="run.csv", sha256="abc", rows=(10, 4010))
+    recording = replace(TRUTH.recording(), source=source)
+    estimate = identify(TRUTH.model, [recording], processing=SETTINGS)
+    log = estimate.inputs[0]
+    assert (log.name, log.sha256, log.rows, log.samples) == ("run 0", "abc", (10, 4010), 4000)
+    assert log.seconds == pytest.approx(19.995)
+    assert estimate.processing == SETTINGS
+    assert estimate.estimator == {"name": "wls", "power": 0.5, "passes": 3, "ridge": 0.0}
+    assert estimate.rank == estimate.base.n_b
+
+
+def test_torque_of_the_fit_is_predicted_at_its_samples():
+    estimate = identify(TRUTH.model, [TRUTH.recording()], processing=SETTINGS)
+    t = np.arange(0, 5, 0.005)
+    motion = smooth_motion(2, t, seed=9)
+    expected = TRUTH.torque(*motion)
+    assert np.abs(estimate.predict(*motion) - expected).max() < 5e-3 * np.abs(expected).max()
+
+
+def weak_recording(noise_seed: int = 0) -> Recording:
+    t = np.arange(0, 10, 0.005)
+    q = np.column_stack([0.02 * np.sin(2 * np.pi * 0.5 * t), 0.02 * np.sin(2 * np.pi * 0.5 * t)])
+    rng = np.random.default_rng(noise_seed)
+    return Recording(t=t, q=q, tau=rng.normal(size=q.shape))
+
+
+def test_a_weak_motion_warns_with_its_condition_number_and_least_certain_parameters():
+    with pytest.warns(
+        TauhatWarning, match=r"(badly conditioned: scaled condition number \d|determines only \d+ of 13)"
+    ):
+        identify(TRUTH.model, [weak_recording()], processing=SETTINGS)
+
+
+def test_a_reversed_torque_warns_that_friction_is_negative():
+    recording = TRUTH.recording()
+    with pytest.warns(TauhatWarning, match=r"friction is negative on 2 of 2 joints \(j1, j2\).*sign = -1"):
+        identify(TRUTH.model, [replace(recording, tau=-recording.tau)], processing=SETTINGS)
+
+
+def test_a_rich_motion_with_the_right_sign_does_not_warn():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        estimate = identify(TRUTH.model, [TRUTH.recording()], processing=SETTINGS)
+    assert estimate.condition < 100
+
+
+def test_no_recording_is_refused():
+    with pytest.raises(ModelError, match="no recording to identify from"):
+        identify(TRUTH.model, [])
+
+
+def test_a_recording_without_torque_is_refused():
+    with pytest.raises(RecordingError, match="no torque in the log"):
+        identify(TRUTH.model, [replace(TRUTH.recording(), tau=None)], processing=SETTINGS)
+
+
+def test_a_recording_of_another_robot_is_refused():
+    with pytest.raises(RecordingError, match="does not fit the robot"):
+        identify(torque_model(chain(np.random.default_rng(0), "RRR")), [TRUTH.recording()], processing=SETTINGS)
+
+
+def test_a_joint_that_never_moves_is_told():
+    t = np.arange(0, 10, 0.005)
+    q = np.column_stack([np.sin(3 * t), 0 * t])
+    still = Recording(t=t, q=q, tau=np.ones_like(q), name="still")
+    with pytest.raises(ModelError, match=r"\d of 4 base parameters never load a joint .* moves every joint"):
+        identify(torque_model(planar_arm(), "viscous,coulomb"), [still], processing=SETTINGS)
+
+
+def test_estimators_go_by_their_names():
+    assert estimator_named("ols") == OrdinaryLeastSquares()
+    assert estimator_named("wls") == WeightedLeastSquares()
+    with pytest.raises(ModelError, match="unknown estimator; expected ols, wls, got lasso"):
+        estimator_named("lasso")
+
+
+@pytest.mark.parametrize(
+    ("method", "settings", "message"),
+    [
+        (OrdinaryLeastSquares, {"ridge": -1.0}, "ridge cannot be negative"),
+        (WeightedLeastSquares, {"ridge": np.nan}, "ridge cannot be negative"),
+        (WeightedLeastSquares, {"power": 3.0}, "expected 0 to 2, got 3.0"),
+        (WeightedLeastSquares, {"passes": 0}, "at least one pass"),
+    ],
+)
+def test_settings_of_estimators_out_of_range_are_refused(method, settings, message):
+    with pytest.raises(ModelError, match=message):
+        method(**settings)
+
+
+def test_torque_that_is_zero_everywhere_is_refused():
+    recording = TRUTH.recording()
+    with pytest.raises(ModelError, match="the torque is zero throughout; name the right torque columns"):
+        identify(TRUTH.model, [replace(recording, tau=np.zeros_like(recording.q))], processing=SETTINGS)
