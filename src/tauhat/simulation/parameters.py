@@ -1,0 +1,131 @@
+"""The true parameters of a simulated robot, which may differ from the nominal ones of its description."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, frozen
+from tauhat.errors import SimulationError
+from tauhat.robots.inertia_checks import inertia_defect
+from tauhat.robots.joint import central_inertia, inertia_at_origin
+from tauhat.robots.robot import Robot
+from tauhat.robots.transforms import rotation_about
+
+_THINNEST = 1e-6  # smallest spread of a perturbed body along a principal axis, relative to all three
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TrueParameters:
+    """What the plant is made of: `tau = inertia(q, dq, ddq) + rotor ddq + viscous dq + coulomb sign(dq) + offset`.
+
+    inertia : (n_v, 10) `m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz` about the joint frames [kg, kg m, kg m^2]
+    rotor : (n_v,) rotor inertia on the joint side [kg m^2 or kg]
+    viscous, coulomb, offset : (n_v,) [Nm s/rad, Nm, Nm] or [N s/m, N, N]
+    """
+
+    inertia: FloatArray
+    rotor: FloatArray
+    viscous: FloatArray
+    coulomb: FloatArray
+    offset: FloatArray
+
+    def __post_init__(self) -> None:
+        inertia = frozen("inertia", self.inertia, (None, 10), where="true parameters")
+        object.__setattr__(self, "inertia", inertia)
+        for name in ("rotor", "viscous", "coulomb", "offset"):
+            values = frozen(name, getattr(self, name), (inertia.shape[0],), where="true parameters")
+            object.__setattr__(self, name, values)
+            if name != "offset" and values.min() < 0.0:
+                joint = int(np.argmin(values)) + 1
+                raise SimulationError(f"{name} is negative", where=f"true parameters, joint {joint}", got=values.min())
+
+    @property
+    def n_v(self) -> int:
+        """Number of joints."""
+        return int(self.inertia.shape[0])
+
+
+def nominal_parameters(robot: Robot) -> TrueParameters:
+    """Return the parameters of the robot's description, without offset."""
+    return TrueParameters(
+        inertia=robot.inertia,
+        rotor=np.array([joint.rotor_inertia for joint in robot.joints]),
+        viscous=np.array([joint.viscous for joint in robot.joints]),
+        coulomb=np.array([joint.coulomb for joint in robot.joints]),
+        offset=np.zeros(robot.n_v),
+    )
+
+
+def perturbed(robot: Robot, rng: np.random.Generator, *, spread: float = 0.1) -> TrueParameters:
+    """Return a random truth around the robot's nominal parameters; every link stays a body of positive density.
+
+    Masses, principal spreads of mass, rotor inertias and friction are multiplied by log-normal factors; centres of mass
+    move and principal axes turn; offsets are a fraction of the Coulomb friction. What is zero stays zero.
+
+    Parameters
+    ----------
+    spread : standard deviation of the relative changes; about half as many radii of gyration for the centres of mass
+
+    Raises
+    ------
+    SimulationError
+        when a nominal link is not a physical body.
+    """
+    nominal = nominal_parameters(robot)
+    links = [perturbed_link(joint.inertia, rng, spread, link=joint.name) for joint in robot.joints]
+    factors = np.exp(spread * rng.standard_normal((3, robot.n_v)))
+    coulomb = factors[2] * nominal.coulomb
+    return TrueParameters(
+        inertia=np.array(links),
+        rotor=factors[0] * nominal.rotor,
+        viscous=factors[1] * nominal.viscous,
+        coulomb=coulomb,
+        offset=spread * rng.standard_normal(robot.n_v) * coulomb,
+    )
+
+
+def perturbed_link(inertia: FloatArray, rng: np.random.Generator, spread: float, *, link: str) -> FloatArray:
+    """Return ten inertial parameters near `inertia` that are those of a body of positive density.
+
+    Works on the second moments of mass about the centre of mass, `S = tr(I)/2 E - I`: any positive S is physical.
+
+    Parameters
+    ----------
+    inertia : (10,) about the link frame's origin
+    link : how messages call it
+    """
+    mass, com, moments, axes = principal_body(inertia, link=link)
+    second = np.maximum(0.5 * moments.sum() - moments, 0.5 * _THINNEST * moments.sum())
+    mass_factor = np.exp(spread * rng.standard_normal())
+    factors = np.exp(spread * rng.standard_normal(3))
+    com = com + axes @ (0.5 * spread * rng.standard_normal(3) * np.sqrt(second / mass))
+    direction = rng.standard_normal(3)
+    angle = np.array([spread * rng.standard_normal()])
+    turned = rotation_about(direction / np.linalg.norm(direction), angle)[0] @ axes
+    spread_of_mass = turned @ np.diag(mass_factor * factors * second) @ turned.T
+    central = np.trace(spread_of_mass) * np.eye(3) - spread_of_mass
+    return inertia_at_origin(mass=mass * mass_factor, com=com, inertia_at_com=central)
+
+
+def principal_body(inertia: FloatArray, *, link: str) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+    """Return mass, centre of mass (3,), principal moments (3,) and axes (3, 3, columns, right-handed) of a link.
+
+    Raises
+    ------
+    SimulationError
+        when no body of positive density has these parameters.
+    """
+    where = f"link of joint {link}"
+    mass, com, central = central_inertia(inertia)
+    if mass <= 0.0:
+        remedy = "give it a mass in the robot's description or in the true parameters"
+        raise SimulationError("the link has no mass", where=where, got=f"{mass:g} kg", remedy=remedy)
+    defect = inertia_defect(mass, central)
+    if defect:
+        remedy = "correct the robot's description or the true parameters"
+        raise SimulationError(defect, where=where, remedy=remedy)
+    moments, axes = np.linalg.eigh(central)
+    axes = axes * np.sign(np.linalg.det(axes))
+    return mass, com, moments, axes
