@@ -168,9 +168,7 @@ def test_its_own_robot_is_accepted():
 
 
 def test_a_robot_mounted_otherwise_is_refused():
-    with pytest.raises(
-        EstimateError, match="same joint names, other axes, placements or gravity"
-    ):
+    with pytest.raises(EstimateError, match="same joint names, other axes, placements or gravity"):
         estimate().check_robot(planar_arm(gravity=(0.0, 9.81, 0.0)))
 
 

@@ -66,9 +66,10 @@ def test_a_late_position_is_read_that_much_further_on():
     late, _, _ = smooth_motion(2, t - 0.02)
     on_time = whole(moving(t))
     mended = whole(moving(t, q=late), Processing(cutoff=10.0, motion_cutoff=30.0, delay=0.02))
-    inside = slice(100, -100)
-    assert np.allclose(mended.q[:, inside], on_time.q[:, inside], rtol=0, atol=1e-9)
-    assert np.array_equal(mended.tau, on_time.tau)
+    both, theirs, ours = np.intersect1d(np.round(on_time.t, 6), np.round(mended.t, 6), return_indices=True)
+    assert both.size > 1900
+    assert np.allclose(mended.tau[:, ours], on_time.tau[:, theirs], rtol=0, atol=1e-9)
+    assert np.allclose(mended.q[:, ours][:, 100:-100], on_time.q[:, theirs][:, 100:-100], rtol=0, atol=1e-9)
 
 
 def test_jittered_clock_is_resampled_onto_a_uniform_one():

@@ -10,6 +10,7 @@ from sample_logs import motion
 
 from tauhat.errors import MapError, RecordingError, TauhatWarning
 from tauhat.recordings.mapfile import parse_map
+from tauhat.recordings.mat_file import mat_arrays
 from tauhat.recordings.reading import read_log, read_recording
 from tauhat.recordings.recognising import map_skeleton
 
@@ -89,6 +90,23 @@ def test_parquet_npz_and_mat_are_read_exactly(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "lying.mat", {name: array.T for name, array in arrays.items()})
     for name in ("run.npz", "small.npz", "run.mat", "lying.mat"):
         assert_is_table(read_recording(tmp_path / name), rows)
+
+
+@pytest.mark.parametrize("packing", [False, True])
+@pytest.mark.parametrize("dtype", ["f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "bool"])
+def test_mat_arrays_of_every_type_are_those_that_scipy_reads(tmp_path: Path, packing: bool, dtype: str) -> None:
+    import scipy.io
+
+    values = np.random.default_rng(2).integers(0, 2 if dtype == "bool" else 100, size=(30, 3)).astype(dtype)
+    others = {"s": {"inner": 1.0}, "c": np.array([1, "x"], dtype=object), "w": "text", "z": np.ones(30) * 1j}
+    arrays = {"clock": np.arange(30.0), "x": values, "a_name_longer_than_four": values[:, :2], "e": np.ones((0, 3))}
+    arrays |= {"k": np.ones((1, 1)), **others}
+    scipy.io.savemat(tmp_path / "run.mat", arrays, do_compression=packing)
+    found = {name: array.values() for name, array in mat_arrays((tmp_path / "run.mat").read_bytes()).items()}
+    theirs = scipy.io.loadmat(tmp_path / "run.mat")
+    assert set(found) == {"clock", "x", "a_name_longer_than_four", "k", "e"}
+    for name, array in found.items():
+        np.testing.assert_array_equal(array, theirs[name])
 
 
 def test_arrays_are_taken_by_key(tmp_path: Path) -> None:

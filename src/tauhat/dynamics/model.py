@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
@@ -108,6 +110,12 @@ class TorqueModel:
     def with_term(self, term: Term) -> TorqueModel:
         """Return the model with the term of the same kind replaced."""
         return replace(self, terms=tuple(term if other.key == term.key else other for other in self.terms))
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the robot's kinematics and of the terms with their settings: what a regressor's columns depend on."""
+        terms = json.dumps(self.to_dict()["terms"], sort_keys=True)
+        return hashlib.sha256(f"{self.robot.fingerprint} {terms}".encode()).hexdigest()[:16]
 
     def to_dict(self) -> dict[str, Any]:
         """Return robot and terms as plain data."""

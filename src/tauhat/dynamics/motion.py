@@ -34,14 +34,6 @@ class Motion:
         """Number of samples."""
         return int(self.q.shape[1])
 
-    def kernel_input(self) -> FloatArray:
-        """Return (5, n_v, n_t): cos q, sin q, q, dq, ddq."""
-        packed = np.empty((5, *self.q.shape))
-        packed[2], packed[3], packed[4] = self.q, self.dq, self.ddq
-        np.cos(packed[2], out=packed[0])
-        np.sin(packed[2], out=packed[1])
-        return packed
-
     def samples(self, start: int, stop: int) -> Motion:
         """Return samples `start` to `stop`, end excluded."""
         load = None if self.load is None else self.load[:, start:stop]

@@ -12,15 +12,16 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from tauhat.dynamics.block_kernel import load_block
 from tauhat.dynamics.sweep_kernel import sweep_link
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def newton_euler_kernel(  # type: ignore[no-untyped-def]
-    parents, prismatic, abc, place, axis, gravity, inertia, motion, out
+    parents, prismatic, abc, place, axis, gravity, inertia, q, dq, ddq, out
 ):
-    """Fill `out` (n_v, n_t) with joint torques from `inertia` (n_v, 10) and `motion` (5, n_v, n_t)."""
-    n_v, n_t = motion.shape[1], motion.shape[2]
+    """Fill `out` (n_v, n_t) with joint torques from `inertia` (n_v, 10) and `q`, `dq`, `ddq` (n_v, n_t)."""
+    n_v, n_t = q.shape
     x = np.empty(64 * 56)
     state = np.empty(576 * n_v)
     pose = np.empty(768 * n_v)
@@ -28,21 +29,20 @@ def newton_euler_kernel(  # type: ignore[no-untyped-def]
     block = np.zeros((5, n_v, 64))
     for start in range(0, n_t, 64):
         size = min(64, n_t - start)
-        block[:, :, :size] = motion[:, :, start : start + size]
+        load_block(start, size, q, dq, ddq, block)
         for i in range(n_v):
             sweep_link(i, parents[i], prismatic[i], abc, place, axis, gravity, block, x, state)
+            kept = pose[768 * i : 768 * i + 768]
             for k in range(768):
-                pose[768 * i + k] = x[k]
+                kept[k] = x[k]
             _link_wrench(i, inertia, x, wrench)
         for i in range(n_v - 1, -1, -1):
-            offset = 0 if prismatic[i] else 192
-            base = 384 * i + offset
+            base = 384 * i + (0 if prismatic[i] else 192)
+            along = wrench[base : base + 192]
+            torque = out[i, start : start + size]
+            e0, e1, e2 = axis[i, 0], axis[i, 1], axis[i, 2]
             for s in range(size):
-                out[i, start + s] = (
-                    axis[i, 0] * wrench[base + s]
-                    + axis[i, 1] * wrench[base + 64 + s]
-                    + axis[i, 2] * wrench[base + 128 + s]
-                )
+                torque[s] = e0 * along[s] + e1 * along[64 + s] + e2 * along[128 + s]
             if parents[i] >= 0:
                 _hand_inward(i, parents[i], pose, wrench, x)
 
@@ -64,16 +64,19 @@ def _link_wrench(i, inertia, x, wrench):  # type: ignore[no-untyped-def]
         x[64 * 36 + s] = xx * d0 + xy * d1 + xz * d2 + w1 * g2 - w2 * g1 + h1 * a2 - h2 * a1
         x[64 * 37 + s] = xy * d0 + yy * d1 + yz * d2 + w2 * g0 - w0 * g2 + h2 * a0 - h0 * a2
         x[64 * 38 + s] = xz * d0 + yz * d1 + zz * d2 + w0 * g1 - w1 * g0 + h0 * a1 - h1 * a0
+    kept = wrench[384 * i : 384 * i + 384]
     for k in range(384):
-        wrench[384 * i + k] = x[64 * 33 + k]
+        kept[k] = x[64 * 33 + k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def _hand_inward(i, p, pose, wrench, x):  # type: ignore[no-untyped-def]
+    placed, carried = pose[768 * i : 768 * i + 768], wrench[384 * i : 384 * i + 384]
+    onto = wrench[384 * p : 384 * p + 384]
     for k in range(768):
-        x[k] = pose[768 * i + k]
+        x[k] = placed[k]
     for k in range(384):
-        x[64 * 12 + k] = wrench[384 * i + k]
+        x[64 * 12 + k] = carried[k]
     for s in range(64):
         f0, f1, f2 = x[64 * 12 + s], x[64 * 13 + s], x[64 * 14 + s]
         n0, n1, n2 = x[64 * 15 + s], x[64 * 16 + s], x[64 * 17 + s]
@@ -88,4 +91,4 @@ def _hand_inward(i, p, pose, wrench, x):  # type: ignore[no-untyped-def]
         x[64 * 37 + s] = x[64 * 3 + s] * n0 + x[64 * 4 + s] * n1 + x[64 * 5 + s] * n2 + p2 * F0 - p0 * F2
         x[64 * 38 + s] = x[64 * 6 + s] * n0 + x[64 * 7 + s] * n1 + x[64 * 8 + s] * n2 + p0 * F1 - p1 * F0
     for k in range(384):
-        wrench[384 * p + k] += x[64 * 33 + k]
+        onto[k] += x[64 * 33 + k]

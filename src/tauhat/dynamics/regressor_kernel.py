@@ -8,7 +8,8 @@ unit speed of joint j, both in link i's frame, and `w, dw, a` of the outward swe
 Going one link outward only the six numbers (z, u) turn: `z = R'z_p, u = R'(u_p + z_p x P)`; own axis: revolute
 `z = e, u = 0`, prismatic `z = 0, u = e`. Output order is Pinocchio's: m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz.
 
-Layout as in `sweep_kernel`; slots 33-38 z u, 39-41 y. `axes[384 * (n_v * i + j)]` keeps z, u of joint j seen from link i.
+Layout as in `sweep_kernel`; slots 42-51 hold the ten entries of one joint and link before they go out.
+`axes[384 * (n_v * i + j)]` keeps z, u of joint j seen from link i.
 """
 
 from __future__ import annotations
@@ -16,79 +17,74 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from tauhat.dynamics.block_kernel import load_block
 from tauhat.dynamics.sweep_kernel import sweep_link
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def regressor_kernel(parents, prismatic, abc, place, axis, gravity, motion, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (10 n_v, n_v, n_t) from `motion` (5, n_v, n_t): cos q, sin q, q, dq, ddq. Rows never touched stay."""
-    n_v, n_t = motion.shape[1], motion.shape[2]
+def regressor_kernel(parents, prismatic, abc, place, axis, gravity, q, dq, ddq, out):  # type: ignore[no-untyped-def]
+    """Fill `out` (10 n_v, n_v, n_t) from `q`, `dq`, `ddq` (n_v, n_t). Rows of links that do not load a joint stay."""
+    n_v, n_t = q.shape
     x = np.empty(64 * 56)
     state = np.empty(576 * n_v)
     axes = np.empty(384 * n_v * n_v)
     block = np.zeros((5, n_v, 64))
     for start in range(0, n_t, 64):
         size = min(64, n_t - start)
-        block[:, :, :size] = motion[:, :, start : start + size]
+        load_block(start, size, q, dq, ddq, block)
         for i in range(n_v):
             p = parents[i]
             sweep_link(i, p, prismatic[i], abc, place, axis, gravity, block, x, state)
             j = p
             while j >= 0:
-                _carry_axis(384 * (n_v * p + j), axes, x)
-                _store_axis(384 * (n_v * i + j), axes, x)
-                _write_columns(i, j, start, size, x, out)
+                inner, outer = 384 * (n_v * p + j), 384 * (n_v * i + j)
+                seen = axes[outer : outer + 384]
+                _carry_axis(axes[inner : inner + 384], seen, x)
+                _write_columns(i, j, start, size, seen, x, out)
                 j = parents[j]
-            _own_axis(axis[i, 0], axis[i, 1], axis[i, 2], prismatic[i], x)
-            _store_axis(384 * (n_v * i + i), axes, x)
-            _write_columns(i, i, start, size, x, out)
+            own = 384 * (n_v * i + i)
+            seen = axes[own : own + 384]
+            _own_axis(axis[i, 0], axis[i, 1], axis[i, 2], prismatic[i], seen)
+            _write_columns(i, i, start, size, seen, x, out)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _carry_axis(base, axes, x):  # type: ignore[no-untyped-def]
-    for k in range(384):
-        x[64 * 42 + k] = axes[base + k]
+def _carry_axis(inner, outer, x):  # type: ignore[no-untyped-def]
     for s in range(64):
-        z0, z1, z2 = x[64 * 42 + s], x[64 * 43 + s], x[64 * 44 + s]
+        z0, z1, z2 = inner[s], inner[64 + s], inner[64 * 2 + s]
         p0, p1, p2 = x[64 * 9 + s], x[64 * 10 + s], x[64 * 11 + s]
-        u0 = x[64 * 45 + s] + z1 * p2 - z2 * p1
-        u1 = x[64 * 46 + s] + z2 * p0 - z0 * p2
-        u2 = x[64 * 47 + s] + z0 * p1 - z1 * p0
-        x[64 * 33 + s] = x[s] * z0 + x[64 * 3 + s] * z1 + x[64 * 6 + s] * z2
-        x[64 * 34 + s] = x[64 + s] * z0 + x[64 * 4 + s] * z1 + x[64 * 7 + s] * z2
-        x[64 * 35 + s] = x[64 * 2 + s] * z0 + x[64 * 5 + s] * z1 + x[64 * 8 + s] * z2
-        x[64 * 36 + s] = x[s] * u0 + x[64 * 3 + s] * u1 + x[64 * 6 + s] * u2
-        x[64 * 37 + s] = x[64 + s] * u0 + x[64 * 4 + s] * u1 + x[64 * 7 + s] * u2
-        x[64 * 38 + s] = x[64 * 2 + s] * u0 + x[64 * 5 + s] * u1 + x[64 * 8 + s] * u2
+        u0 = inner[64 * 3 + s] + z1 * p2 - z2 * p1
+        u1 = inner[64 * 4 + s] + z2 * p0 - z0 * p2
+        u2 = inner[64 * 5 + s] + z0 * p1 - z1 * p0
+        outer[s] = x[s] * z0 + x[64 * 3 + s] * z1 + x[64 * 6 + s] * z2
+        outer[64 + s] = x[64 + s] * z0 + x[64 * 4 + s] * z1 + x[64 * 7 + s] * z2
+        outer[64 * 2 + s] = x[64 * 2 + s] * z0 + x[64 * 5 + s] * z1 + x[64 * 8 + s] * z2
+        outer[64 * 3 + s] = x[s] * u0 + x[64 * 3 + s] * u1 + x[64 * 6 + s] * u2
+        outer[64 * 4 + s] = x[64 + s] * u0 + x[64 * 4 + s] * u1 + x[64 * 7 + s] * u2
+        outer[64 * 5 + s] = x[64 * 2 + s] * u0 + x[64 * 5 + s] * u1 + x[64 * 8 + s] * u2
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _own_axis(e0, e1, e2, prismatic, x):  # type: ignore[no-untyped-def]
+def _own_axis(e0, e1, e2, prismatic, own):  # type: ignore[no-untyped-def]
     turn = 0.0 if prismatic else 1.0
     slide = 1.0 - turn
     for s in range(64):
-        x[64 * 33 + s] = turn * e0
-        x[64 * 34 + s] = turn * e1
-        x[64 * 35 + s] = turn * e2
-        x[64 * 36 + s] = slide * e0
-        x[64 * 37 + s] = slide * e1
-        x[64 * 38 + s] = slide * e2
+        own[s] = turn * e0
+        own[64 + s] = turn * e1
+        own[64 * 2 + s] = turn * e2
+        own[64 * 3 + s] = slide * e0
+        own[64 * 4 + s] = slide * e1
+        own[64 * 5 + s] = slide * e2
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _store_axis(base, axes, x):  # type: ignore[no-untyped-def]
-    for k in range(384):
-        axes[base + k] = x[64 * 33 + k]
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _write_columns(i, j, start, size, x, out):  # type: ignore[no-untyped-def]
+def _write_columns(i, j, start, size, seen, x, out):  # type: ignore[no-untyped-def]
     for s in range(64):
         w0, w1, w2 = x[64 * 21 + s], x[64 * 22 + s], x[64 * 23 + s]
         d0, d1, d2 = x[64 * 24 + s], x[64 * 25 + s], x[64 * 26 + s]
         a0, a1, a2 = x[64 * 27 + s], x[64 * 28 + s], x[64 * 29 + s]
-        z0, z1, z2 = x[64 * 33 + s], x[64 * 34 + s], x[64 * 35 + s]
-        u0, u1, u2 = x[64 * 36 + s], x[64 * 37 + s], x[64 * 38 + s]
+        z0, z1, z2 = seen[s], seen[64 + s], seen[64 * 2 + s]
+        u0, u1, u2 = seen[64 * 3 + s], seen[64 * 4 + s], seen[64 * 5 + s]
         y0, y1, y2 = z1 * w2 - z2 * w1, z2 * w0 - z0 * w2, z0 * w1 - z1 * w0
         c0, c1, c2 = w1 * u2 - w2 * u1, w2 * u0 - w0 * u2, w0 * u1 - w1 * u0
         x[64 * 42 + s] = u0 * a0 + u1 * a1 + u2 * a2

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
 import numpy as np
 
 from tauhat.arrays import FloatArray, frozen
@@ -13,16 +16,18 @@ from tauhat.errors import ArrayError
 from tauhat.robots.robot import Robot
 
 
-def regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+def regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray, *, threads: int = 1) -> FloatArray:
     """Return Y with `tau = Y @ standard parameters` for rigid links.
 
     Parameters
     ----------
     q, dq, ddq : (n_t, n_v) [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
+    threads : over how many threads the samples are spread
 
     Returns
     -------
-    (n_t, n_v, 10 n_v), parameters link by link in the order `m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz`.
+    (n_t, n_v, 10 n_v), a view with time last in memory; parameters link by link in the order
+    `m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz`.
 
     Raises
     ------
@@ -32,14 +37,27 @@ def regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> F
     Source: Atkeson, An, Hollerbach, "Estimation of inertial parameters of manipulator loads and links", 1986.
     """
     motion = _checked(robot, q, dq, ddq)
-    columns = inertial_columns(kernel_tree(robot), motion)
-    return np.ascontiguousarray(columns.transpose(2, 1, 0))
+    return inertial_columns(kernel_tree(robot), motion, threads=threads).transpose(2, 1, 0)
 
 
-def inertial_columns(tree: KernelTree, motion: Motion, out: FloatArray | None = None) -> FloatArray:
-    """Return the regressor in kernel layout, (10 n_v, n_v, n_t); zero where a link does not load a joint."""
+def inertial_columns(
+    tree: KernelTree, motion: Motion, *, out: FloatArray | None = None, threads: int = 1
+) -> FloatArray:
+    """Return the regressor in kernel layout, (10 n_v, n_v, n_t); zero where a link does not load a joint.
+
+    Parameters
+    ----------
+    out : zeroed array to fill; entries of links that do not load a joint are never touched
+    threads : over how many threads the samples are spread
+    """
     columns = np.zeros((10 * motion.n_v, motion.n_v, motion.n_t)) if out is None else out
-    regressor_kernel(*tree.geometry, motion.kernel_input(), columns)
+    if threads == 1:
+        regressor_kernel(*tree.geometry, motion.q, motion.dq, motion.ddq, columns)
+        return columns
+    edges = np.linspace(0, motion.n_t, threads + 1).astype(int)
+    with ThreadPoolExecutor(threads) as pool:
+        parts = [(motion.samples(a, b), columns[:, :, a:b]) for a, b in pairwise(edges)]
+        list(pool.map(lambda part: inertial_columns(tree, part[0], out=part[1]), parts))
     return columns
 
 
@@ -63,7 +81,7 @@ def inverse_dynamics(
 def rigid_torque(tree: KernelTree, motion: Motion, inertia: FloatArray) -> FloatArray:
     """Return the rigid-body torque in kernel layout, (n_v, n_t)."""
     torque = np.empty((motion.n_v, motion.n_t))
-    newton_euler_kernel(*tree.geometry, inertia, motion.kernel_input(), torque)
+    newton_euler_kernel(*tree.geometry, inertia, motion.q, motion.dq, motion.ddq, torque)
     return torque
 
 

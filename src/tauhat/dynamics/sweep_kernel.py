@@ -34,18 +34,18 @@ def sweep_link(i, parent, prismatic, abc, place, axis, gravity, motion, x, state
             x[64 * 19 + s] = -gravity[1]
             x[64 * 20 + s] = -gravity[2]
     else:
-        base = 576 * parent
+        carried = state[576 * parent : 576 * parent + 576]
         for k in range(576):
-            x[64 * 12 + k] = state[base + k]
+            x[64 * 12 + k] = carried[k]
     _rotate_motion(x)
     e0, e1, e2 = axis[i, 0], axis[i, 1], axis[i, 2]
     if prismatic:
         _add_prismatic(i, e0, e1, e2, motion, x)
     else:
         _add_revolute(i, e0, e1, e2, motion, x)
-    base = 576 * i
+    kept = state[576 * i : 576 * i + 576]
     for k in range(576):
-        state[base + k] = x[64 * 21 + k]
+        kept[k] = x[64 * 21 + k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
@@ -59,16 +59,18 @@ def _pose(i, prismatic, abc, place, axis, motion, x):  # type: ignore[no-untyped
             r = abc[i, 0, k]
             for s in range(64):
                 x[64 * k + s] = r
+        position = motion[2, i]
         for s in range(64):
-            q = motion[2, i, s]
+            q = position[s]
             x[64 * 9 + s] = p0 + d0 * q
             x[64 * 10 + s] = p1 + d1 * q
             x[64 * 11 + s] = p2 + d2 * q
         return
+    cosine, sine = motion[0, i], motion[1, i]
     for k in range(9):
         r0, rc, rs = abc[i, 0, k], abc[i, 1, k], abc[i, 2, k]
         for s in range(64):
-            x[64 * k + s] = r0 + rc * motion[0, i, s] + rs * motion[1, i, s]
+            x[64 * k + s] = r0 + rc * cosine[s] + rs * sine[s]
     for s in range(64):
         x[64 * 9 + s] = p0
         x[64 * 10 + s] = p1
@@ -98,8 +100,9 @@ def _rotate_motion(x):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def _add_revolute(i, e0, e1, e2, motion, x):  # type: ignore[no-untyped-def]
+    speed, acceleration = motion[3, i], motion[4, i]
     for s in range(64):
-        dq, ddq = motion[3, i, s], motion[4, i, s]
+        dq, ddq = speed[s], acceleration[s]
         v0, v1, v2 = x[64 * 30 + s], x[64 * 31 + s], x[64 * 32 + s]
         x[64 * 21 + s] = v0 + e0 * dq
         x[64 * 22 + s] = v1 + e1 * dq
@@ -111,8 +114,9 @@ def _add_revolute(i, e0, e1, e2, motion, x):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def _add_prismatic(i, e0, e1, e2, motion, x):  # type: ignore[no-untyped-def]
+    speed, acceleration = motion[3, i], motion[4, i]
     for s in range(64):
-        dq, ddq = motion[3, i, s], motion[4, i, s]
+        dq, ddq = speed[s], acceleration[s]
         v0, v1, v2 = x[64 * 30 + s], x[64 * 31 + s], x[64 * 32 + s]
         x[64 * 21 + s] = v0
         x[64 * 22 + s] = v1

@@ -94,10 +94,10 @@ def band_residual(
     whole = Rows(*(np.concatenate(parts, axis=-1) for parts in zip(*pieces, strict=True)))
     high = high_pass(lower, (whole.t.size - 1) / float(whole.t[-1] - whole.t[0]))
     detail = whole._replace(columns=filtered(whole.columns, high), tau=filtered(whole.tau, high))
-    evidence = evidence_from_rows(layout, base, [detail])
+    evidence = evidence_from_rows(layout, base, [detail], most_blocks=1)
     torque = joint_torques(evidence)
     weights = 1.0 / np.where(torque > 0, torque, 1.0)
-    values, _, _ = solve(evidence, weights, ridge=_RIDGE)
+    values = solve(evidence, weights, ridge=_RIDGE)
     return float(np.linalg.norm(joint_residuals(evidence, values) * weights))
 
 

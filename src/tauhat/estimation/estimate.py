@@ -210,7 +210,7 @@ def load_estimate(path: str | Path) -> Estimate:
     EstimateError
         when the file is missing, cut off, not an estimate, damaged or of a newer schema.
     """
-    text = read_text(Path(path), largest=_LARGEST_FILE)
+    text = read_text(Path(path), error=EstimateError, largest=_LARGEST_FILE)
     try:
         data = json.loads(text)
     except (json.JSONDecodeError, RecursionError) as error:

@@ -10,13 +10,13 @@ cross-validation can be made of. When there are too many blocks, neighbours merg
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from functools import reduce
 
 import numpy as np
 
-from tauhat.arrays import FloatArray, IntArray
+from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.errors import ModelError
@@ -38,6 +38,10 @@ class Block:
 
     factors: tuple[FloatArray, ...]
     n_t: int
+
+    def __post_init__(self) -> None:
+        for factor in self.factors:
+            read_only(factor)
 
     def merged(self, other: Block) -> Block:
         """Return the block of both stretches."""
@@ -67,12 +71,21 @@ class Evidence:
     n_b : number of kept parameters
     blocks : consecutive stretches of time, at most 64
     recordings : names of the recordings inside
+    fingerprint : of the model whose columns these are
+    total : the factors of all blocks together
     """
 
     supports: tuple[IntArray, ...]
     n_b: int
     blocks: tuple[Block, ...]
     recordings: tuple[str, ...] = ()
+    fingerprint: str = ""
+    total: Block = field(init=False)
+
+    def __post_init__(self) -> None:
+        for support in self.supports:
+            read_only(support)
+        object.__setattr__(self, "total", _together(self.blocks))
 
     @property
     def n_v(self) -> int:
@@ -84,11 +97,6 @@ class Evidence:
         """Number of rows per joint."""
         return sum(block.n_t for block in self.blocks)
 
-    @property
-    def total(self) -> Block:
-        """The factors of all blocks together."""
-        return _tree(self.blocks)
-
     def merged(self, other: Evidence) -> Evidence:
         """Return the evidence of both; any order of merging gives the same estimate.
 
@@ -97,23 +105,29 @@ class Evidence:
         ModelError
             when the two belong to different models.
         """
-        same = self.n_b == other.n_b and len(self.supports) == len(other.supports)
-        if not same or any(not np.array_equal(a, b) for a, b in zip(self.supports, other.supports, strict=True)):
+        if self.n_b != other.n_b or self.fingerprint != other.fingerprint:
             raise ModelError("evidence of different models cannot be merged")
-        blocks = (*self.blocks, *other.blocks)
-        while len(blocks) > MOST_BLOCKS:
-            blocks = _halved(blocks)
+        blocks = _at_most((*self.blocks, *other.blocks), MOST_BLOCKS)
         return replace(self, blocks=blocks, recordings=(*self.recordings, *other.recordings))
+
+    def merged_blocks(self, most: int) -> tuple[Block, ...]:
+        """Return the blocks of time with neighbours merged until there are at most `most`."""
+        return _at_most(self.blocks, most)
 
     def without(self, block: int) -> Evidence:
         """Return the evidence without one block of time."""
         return replace(self, blocks=self.blocks[:block] + self.blocks[block + 1 :])
 
 
-def _tree(blocks: tuple[Block, ...]) -> Block:
-    while len(blocks) > 1:
+def _together(blocks: tuple[Block, ...]) -> Block:
+    stacked = (np.vstack(factors) for factors in zip(*(block.factors for block in blocks), strict=True))
+    return Block(factors=tuple(_reduced(rows) for rows in stacked), n_t=sum(block.n_t for block in blocks))
+
+
+def _at_most(blocks: tuple[Block, ...], most: int) -> tuple[Block, ...]:
+    while len(blocks) > most:
         blocks = _halved(blocks)
-    return blocks[0]
+    return blocks
 
 
 def _halved(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
@@ -122,9 +136,19 @@ def _halved(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
 
 
 def collect(
-    model: TorqueModel, base: BaseParameters, recording: Recording, processing: Processing, *, chunk: int = CHUNK
+    model: TorqueModel,
+    base: BaseParameters,
+    recording: Recording,
+    processing: Processing,
+    *,
+    chunk: int = CHUNK,
+    most_blocks: int = MOST_BLOCKS,
 ) -> Evidence:
     """Return the evidence of one recording on the model's base parameters, in constant memory.
+
+    Parameters
+    ----------
+    most_blocks : how many blocks of time are kept; one is enough where no error bars are wanted
 
     Raises
     ------
@@ -133,19 +157,33 @@ def collect(
     """
     layout = model.layout(base.independent)
     rows = filtered_rows(model, layout, recording, processing, chunk=chunk)
-    return evidence_from_rows(layout, base, rows, name=recording.name)
+    blocks = tuple(_grown_blocks(layout, rows) if most_blocks > 1 else _one_block(layout, rows))
+    return _evidence(layout, base, blocks, name=recording.name, fingerprint=model.fingerprint)
 
 
-def evidence_from_rows(layout: Layout, base: BaseParameters, rows: Iterable[Rows], *, name: str = "rows") -> Evidence:
-    """Return the evidence of a stream of rows."""
-    place = np.full(len(base.names), -1)
-    place[base.independent] = np.arange(base.n_b)
-    n_v = layout.bounds.size - 1
-    supports = tuple(place[layout.parameters[layout.of_joint(joint)]] for joint in range(n_v))
-    blocks = tuple(_grown_blocks(layout, rows))
+def evidence_from_rows(
+    layout: Layout, base: BaseParameters, rows: Iterable[Rows], *, name: str = "rows", most_blocks: int = MOST_BLOCKS
+) -> Evidence:
+    """Return the evidence of a stream of rows, in at most `most_blocks` blocks of time."""
+    blocks = tuple(_grown_blocks(layout, rows) if most_blocks > 1 else _one_block(layout, rows))
+    return _evidence(layout, base, blocks, name=name, fingerprint="")
+
+
+def _evidence(
+    layout: Layout, base: BaseParameters, blocks: tuple[Block, ...], *, name: str, fingerprint: str
+) -> Evidence:
     if not blocks:
         raise ModelError("no row of the recording is left to identify from", where=name)
-    return Evidence(supports=supports, n_b=base.n_b, blocks=blocks, recordings=(name,))
+    place = np.full(len(base.names), -1)
+    place[base.independent] = np.arange(base.n_b)
+    supports = tuple(place[layout.parameters[layout.of_joint(joint)]] for joint in range(layout.bounds.size - 1))
+    return Evidence(supports=supports, n_b=base.n_b, blocks=blocks, recordings=(name,), fingerprint=fingerprint)
+
+
+def _one_block(layout: Layout, rows: Iterable[Rows]) -> list[Block]:
+    pieces = (_block(layout, piece, 0, piece.t.size) for piece in rows)
+    first = next(pieces, None)
+    return [] if first is None else [reduce(Block.merged, pieces, first).reduced()]
 
 
 def _grown_blocks(layout: Layout, rows: Iterable[Rows]) -> list[Block]:
@@ -187,8 +225,13 @@ def _block(layout: Layout, piece: Rows, start: int, stop: int) -> Block:
 
 
 def collect_all(
-    model: TorqueModel, base: BaseParameters, recordings: Iterable[Recording], processing: Processing
+    model: TorqueModel,
+    base: BaseParameters,
+    recordings: Iterable[Recording],
+    processing: Processing,
+    *,
+    most_blocks: int = MOST_BLOCKS,
 ) -> Evidence:
-    """Return the merged evidence of several recordings."""
-    parts: Iterator[Evidence] = (collect(model, base, recording, processing) for recording in recordings)
+    """Return the merged evidence of several recordings; `most_blocks` of each."""
+    parts = (collect(model, base, recording, processing, most_blocks=most_blocks) for recording in recordings)
     return reduce(Evidence.merged, parts)

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 
+from tauhat.blas import single_threaded
 from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.errors import ModelError, TauhatWarning
@@ -21,6 +22,7 @@ from tauhat.recordings.recording import Recording
 DOUBTFUL_CONDITION = 300.0  # scaled condition number above which a motion does not support its model
 
 
+@single_threaded
 def identify(
     model: TorqueModel,
     recordings: Sequence[Recording],
@@ -100,15 +102,15 @@ def warn_of_weak_motion(evidence: Evidence, solution: Solution, estimate: Estima
     """Warn when rank is lost or the scaled condition number says that the motion cannot tell the parameters apart."""
     if solution.rank < evidence.n_b:
         warnings.warn(
-            f"the motion determines only {solution.rank} of {evidence.n_b} base parameters, the others are the smallest "
-            "that fit: do not use the model outside this motion; record a richer one",
+            f"the motion determines only {solution.rank} of {evidence.n_b} base parameters, the others are the "
+            "smallest that fit: do not use the model outside this motion; record a richer one",
             TauhatWarning,
             stacklevel=3,
         )
     elif solution.condition > DOUBTFUL_CONDITION:
         weakest = sorted(estimate.summary(), key=lambda row: -row.relative)[:3]
         warnings.warn(
-            f"scaled condition number {solution.condition:.3g} (good: below 100, doubtful: above "
+            f"scaled condition number {solution.condition:.3g} (good below 100, doubtful above "
             f"{DOUBTFUL_CONDITION:g}); least certain: {', '.join(row.name for row in weakest)}; the model fits this "
             "motion and may be far off on another: record a richer one or give more recordings",
             TauhatWarning,

@@ -11,16 +11,22 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence
-from tauhat.estimation.solution import Solution, honest_covariance, joint_residuals, joint_torques, solve
+from tauhat.estimation.solution import (
+    Solution,
+    honest_covariance,
+    joint_residuals,
+    joint_torques,
+    rank_and_condition,
+    solve,
+    time_groups,
+)
 
 
 class Solved(NamedTuple):
-    """Values and weights of a solve, without error bars; rank and condition are of the scaled regressor."""
+    """Values and weights of a solve, without error bars."""
 
     values: FloatArray
     weights: FloatArray
-    rank: int
-    condition: float
     passes: int
 
 
@@ -43,18 +49,31 @@ class Estimator(ABC):
         """Return values alone, the quick part of `fit`."""
 
     def fit(self, evidence: Evidence) -> Solution:
-        """Return values, covariance and diagnostics."""
+        """Return values, covariance and diagnostics.
+
+        Raises
+        ------
+        ModelError
+            when there are no more rows than parameters: neither values nor error bars would mean anything.
+        """
+        rows = evidence.n_v * evidence.n_t
+        if rows <= evidence.n_b:
+            raise ModelError(
+                f"{rows} filtered rows cannot determine {evidence.n_b} base parameters",
+                remedy="give a longer recording, or a higher cut-off",
+            )
         solved = self.solve(evidence)
-        blocks, rows = len(evidence.blocks), evidence.n_v * evidence.n_t
+        rank, condition = rank_and_condition(evidence, solved.weights)
+        groups = len(time_groups(evidence))
         return Solution(
             values=solved.values,
             covariance=honest_covariance(evidence, solved.weights, solved.values, ridge=self.ridge),
             weights=solved.weights,
             joint_rms=joint_residuals(evidence, solved.values),
             torque_rms=joint_torques(evidence),
-            rank=solved.rank,
-            condition=solved.condition,
-            degrees=blocks - 1 if blocks > 1 else max(1, rows - evidence.n_b),
+            rank=rank,
+            condition=condition,
+            degrees=groups - 1 if groups > 1 else rows - evidence.n_b,
             passes=solved.passes,
         )
 
@@ -71,8 +90,7 @@ class OrdinaryLeastSquares(Estimator):
     def solve(self, evidence: Evidence) -> Solved:
         """Return the solution with unit weights."""
         weights = np.ones(evidence.n_v)
-        values, rank, condition = solve(evidence, weights, ridge=self.ridge)
-        return Solved(values, weights, rank, condition, 1)
+        return Solved(solve(evidence, weights, ridge=self.ridge), weights, 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,11 +118,11 @@ class WeightedLeastSquares(Estimator):
     def solve(self, evidence: Evidence) -> Solved:
         """Return the solution after the last pass."""
         weights = np.ones(evidence.n_v)
-        values, rank, condition = solve(evidence, weights, ridge=self.ridge)
+        values = solve(evidence, weights, ridge=self.ridge)
         for _ in range(self.passes):
             weights = self._weights(evidence, values)
-            values, rank, condition = solve(evidence, weights, ridge=self.ridge)
-        return Solved(values, weights, rank, condition, self.passes + 1)
+            values = solve(evidence, weights, ridge=self.ridge)
+        return Solved(values, weights, self.passes + 1)
 
     def _weights(self, evidence: Evidence, values: FloatArray) -> FloatArray:
         residual, torque = joint_residuals(evidence, values), joint_torques(evidence)

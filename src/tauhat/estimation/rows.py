@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,8 @@ from tauhat.errors import RecordingError
 from tauhat.recordings.filters import with_context
 from tauhat.recordings.processing import CHUNK, Processing, Stretch, moving_window, stretches, uniform_clock
 from tauhat.recordings.recording import Recording
+
+_LARGEST_MARGIN = 0.1  # of the recording, left out at each end
 
 
 class Rows(NamedTuple):
@@ -34,7 +36,10 @@ class Rows(NamedTuple):
 def filtered_rows(
     model: TorqueModel, layout: Layout, recording: Recording, processing: Processing, *, chunk: int = CHUNK
 ) -> Iterator[Rows]:
-    """Yield the rows of a recording, standstill at both ends left out; the same whatever the chunk.
+    """Yield the rows of a recording; the same whatever the chunk.
+
+    Standstill at both ends is left out, and where the log begins or ends in motion the time that the filters take to
+    forget how they were continued there, `1 / cutoff`.
 
     Raises
     ------
@@ -43,24 +48,50 @@ def filtered_rows(
     """
     check_joints(model, recording)
     clock = uniform_clock(recording, processing.delay)
-    low_pass = processing.parallel_filter(1.0 / clock.step)
-    n_v, n_rows = model.robot.n_v, layout.parameters.size
-    begin, end = moving_window(recording)
-    done = 0
-    stacked = _stacked(model, layout, stretches(recording, processing, chunk=chunk), clock.step)
-    for window in with_context(stacked, low_pass.half, multiple=low_pass.decimation):
-        filtered = low_pass.apply(window)
-        t = clock.start + (done + np.arange(filtered.shape[1])) * low_pass.decimation * clock.step
-        done += filtered.shape[1]
-        kept = (t >= begin) & (t <= end)
+    begin, end = _trusted_window(recording, processing)
+    motion = stretches(recording, processing, chunk=chunk)
+    for rows in rows_of_stretches(model, layout, motion, processing, step=clock.step):
+        kept = (rows.t >= begin) & (rows.t <= end)
         if kept.any():
-            part = filtered[:, kept]
-            yield Rows(t[kept], part[:n_rows], part[n_rows : n_rows + n_v], part[n_rows + n_v :])
+            yield Rows(rows.t[kept], rows.columns[:, kept], rows.tau[:, kept], rows.dq[:, kept])
 
 
-def _stacked(model: TorqueModel, layout: Layout, motion: Iterator[Stretch], step: float) -> Iterator[FloatArray]:
+def _trusted_window(recording: Recording, processing: Processing) -> tuple[float, float]:
+    begin, end = moving_window(recording)
+    margin = min(1.0 / processing.cutoff, _LARGEST_MARGIN * recording.duration)
+    return max(begin, float(recording.t[0]) + margin), min(end, float(recording.t[-1]) - margin)
+
+
+def rows_of_stretches(
+    model: TorqueModel, layout: Layout, motion: Iterable[Stretch], processing: Processing, *, step: float
+) -> Iterator[Rows]:
+    """Yield the rows of consecutive stretches of motion: columns and torque through the parallel filter.
+
+    Parameters
+    ----------
+    step : time between the samples of the stretches [s]
+    """
+    low_pass = processing.parallel_filter(1.0 / step)
+    n_v, n_rows = model.robot.n_v, layout.parameters.size
+    times: list[float] = []
+    done = 0
+    stacked = _stacked(model, layout, motion, step, times)
+    for window in with_context(stacked, low_pass.half, multiple=low_pass.decimation):
+        part = low_pass.apply(window)
+        ticks = np.arange(done, done + part.shape[1], dtype=np.float64)
+        t = times[0] + ticks * (low_pass.decimation * step)
+        done += part.shape[1]
+        yield Rows(t, part[:n_rows], part[n_rows : n_rows + n_v], part[n_rows + n_v :])
+
+
+def _stacked(
+    model: TorqueModel, layout: Layout, motion: Iterable[Stretch], step: float, times: list[float]
+) -> Iterator[FloatArray]:
+    """Yield columns, torque and velocity stacked by rows; note the first time in `times`."""
     states: TermStates | None = None
     for stretch in motion:
+        if not times:
+            times.append(float(stretch.t[0]))
         block = Motion(q=stretch.q, dq=stretch.dq, ddq=stretch.ddq, step=step)
         columns, states = model.columns(block, layout, states)
         yield np.concatenate([columns, stretch.tau, stretch.dq])

@@ -19,11 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tauhat.arrays import FloatArray
+from tauhat.arrays import FloatArray, read_only
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Block, Evidence
 
 RANK = 1e-10  # singular values below this part of the largest are taken as zero
+_WELL = 1e-8  # smallest over largest pivot with which the triangle is solved as it is
+MOST_GROUPS = 16  # of blocks of time in the jackknife: fewer and longer ones outlast the residuals' correlation
 _LEAST_FREE = 1e-3  # smallest eigenvalue of E - B'B that is trusted: a parameter that one block alone decides
 
 
@@ -51,16 +53,51 @@ class Solution:
     degrees: int
     passes: int
 
+    def __post_init__(self) -> None:
+        for array in (self.values, self.covariance, self.weights, self.joint_rms, self.torque_rms):
+            read_only(array)
 
-def solve(evidence: Evidence, weights: FloatArray, *, ridge: float) -> tuple[FloatArray, int, float]:
-    """Return the minimum-norm weighted solution, its rank and the scaled condition number.
+
+def solve(evidence: Evidence, weights: FloatArray, *, ridge: float) -> FloatArray:
+    """Return the weighted least-squares solution, (n_b,); the one of minimum norm where the evidence lacks rank.
 
     Parameters
     ----------
     weights : (n_v,) factors on each joint's equations
     ridge : pull of every column-scaled parameter to zero: adds `ridge^2 |x_scaled|^2` to the squared error of a problem
         with columns of unit norm
+
+    Raises
+    ------
+    ModelError
+        when the torque or a whole column is zero.
     """
+    from scipy.linalg import solve_triangular
+
+    triangle, scale = _triangle(evidence, weights)
+    square, rhs = triangle[:, :-1], triangle[:, -1]
+    if ridge > 0.0:
+        pulled = np.vstack([triangle, ridge * np.eye(evidence.n_b, evidence.n_b + 1)])
+        triangle = np.asarray(np.linalg.qr(pulled, mode="r"))[: evidence.n_b]
+        square, rhs = triangle[:, :-1], triangle[:, -1]
+    pivots = np.abs(np.diag(square))
+    if square.shape[0] == square.shape[1] and pivots.min() > _WELL * pivots.max():
+        return np.asarray(solve_triangular(square, rhs) / scale)
+    left, singular, right = np.linalg.svd(square, full_matrices=False)
+    kept = singular > RANK * singular[0]
+    return np.asarray(right[kept].T @ ((left[:, kept].T @ rhs) / singular[kept]) / scale)
+
+
+def rank_and_condition(evidence: Evidence, weights: FloatArray) -> tuple[int, float]:
+    """Return rank and condition number of the weighted stacked regressor with columns of unit norm."""
+    triangle, _ = _triangle(evidence, weights)
+    singular = np.linalg.svd(triangle[:, :-1], compute_uv=False)
+    condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
+    return int((singular > RANK * singular[0]).sum()), condition
+
+
+def _triangle(evidence: Evidence, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the factor [R z] of the whole weighted problem with columns of unit norm, and the columns' norms."""
     matrix, rhs = _stacked(evidence, evidence.total, weights)
     if not rhs.any():
         raise ModelError("the torque is zero throughout", remedy="name the right torque columns in the map")
@@ -71,12 +108,8 @@ def solve(evidence: Evidence, weights: FloatArray, *, ridge: float) -> tuple[Flo
             f"{silent} of {evidence.n_b} base parameters never load a joint in these recordings",
             remedy="record a motion that moves every joint",
         )
-    left, singular, right = np.linalg.svd(matrix / scale, full_matrices=False)
-    kept = singular > RANK * singular[0]
-    gains = singular[kept] / (singular[kept] ** 2 + ridge**2)
-    values = right[kept].T @ (gains * (left[:, kept].T @ rhs)) / scale
-    condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
-    return values, int(kept.sum()), condition
+    triangle = np.asarray(np.linalg.qr(np.column_stack([matrix / scale, rhs]), mode="r"))
+    return triangle[: evidence.n_b], np.asarray(scale)
 
 
 def _stacked(evidence: Evidence, block: Block, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -109,7 +142,7 @@ def honest_covariance(evidence: Evidence, weights: FloatArray, values: FloatArra
     """Return the covariance of the parameters, (n_b, n_b); see the head of this file."""
     matrix, rhs = _stacked(evidence, evidence.total, weights)
     scale = np.linalg.norm(matrix, axis=0)
-    _, singular, right = np.linalg.svd(matrix / scale, full_matrices=False)
+    _, singular, right = np.linalg.svd(np.linalg.qr(matrix / scale, mode="r"), full_matrices=False)
     damped = np.sqrt(singular**2 + ridge**2)
     damped = np.maximum(damped, RANK * damped[0])
     root = right.T / damped  # A'A = S (root root')^-1 S with the column scales S
@@ -117,18 +150,26 @@ def honest_covariance(evidence: Evidence, weights: FloatArray, values: FloatArra
     variance = np.sum((matrix @ values - rhs) ** 2) / max(1, rows - evidence.n_b)
     white = variance * (root @ root.T) / np.outer(scale, scale)
     spread = np.diag(white).copy()
-    if len(evidence.blocks) > 1:
-        moves = _block_moves(evidence, weights, values, root / scale[:, None])
-        count = len(evidence.blocks)
+    groups = time_groups(evidence)
+    if len(groups) > 1:
+        moves = _block_moves(evidence, groups, weights, values, root=root / scale[:, None])
+        count = len(groups)
         spread = np.maximum(spread, (count - 1) / count * np.sum(moves**2, axis=0))
     inflation = np.sqrt(spread / np.diag(white))
     return np.asarray(white * np.outer(inflation, inflation))
 
 
-def _block_moves(evidence: Evidence, weights: FloatArray, values: FloatArray, root: FloatArray) -> FloatArray:
-    """Return how far the solution moves when each block is left out, (n_blocks, n_b)."""
+def time_groups(evidence: Evidence) -> tuple[Block, ...]:
+    """Return the blocks of time merged to at most sixteen: what the jackknife leaves out one at a time."""
+    return evidence.merged_blocks(MOST_GROUPS)
+
+
+def _block_moves(
+    evidence: Evidence, groups: tuple[Block, ...], weights: FloatArray, values: FloatArray, *, root: FloatArray
+) -> FloatArray:
+    """Return how far the solution moves when each group is left out, (n_groups, n_b)."""
     moves = []
-    for block in evidence.blocks:
+    for block in groups:
         matrix, rhs = _stacked(evidence, block, weights)
         turned = matrix @ root
         score = turned.T @ (rhs - matrix @ values)

@@ -70,7 +70,7 @@ def residual_level(
     model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], processing: Processing
 ) -> float:
     """Return the mean logarithm of the joints' residuals after a weighted fit: what candidates are judged by."""
-    evidence = collect_all(model, base, recordings, processing)
+    evidence = collect_all(model, base, recordings, processing, most_blocks=1)
     residuals = joint_residuals(evidence, WeightedLeastSquares(passes=1).solve(evidence).values)
     return float(np.mean(np.log(np.maximum(residuals, np.finfo(float).tiny))))
 
@@ -103,11 +103,11 @@ def _best_processing(
     narrow = default.motion_cutoff / MOTION_CUTOFF
     candidates = [replace(default, motion_cutoff=narrow)]
     if all(recording.dq is not None for recording in recordings):
-        candidates += [replace(default, velocity="velocity")]
         candidates += [replace(default, velocity="velocity", motion_cutoff=narrow)]
-    best, level = default, residual_level(model, base, recordings, default) - _LEAST_GAIN
+        candidates += [replace(default, velocity="velocity")]
+    best, level = default, residual_level(model, base, recordings, default)
     for candidate in candidates:
         other = residual_level(model, base, recordings, candidate)
-        if other < level:
+        if other < level - _LEAST_GAIN:
             best, level = candidate, other
     return best

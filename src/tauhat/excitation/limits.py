@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauhat.arrays import FloatArray, frozen
-from tauhat.errors import RobotError
+from tauhat.errors import ExcitationError, RobotError
 from tauhat.robots.joint import Joint, JointKind
 from tauhat.robots.robot import Robot
 

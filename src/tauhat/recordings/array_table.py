@@ -104,26 +104,40 @@ class MatTable(ArrayTable):
     """A MATLAB file up to version 7; structs and cells are not read."""
 
     def __init__(self, path: Path) -> None:
-        from scipy.io import whosmat
+        from tauhat.recordings.mat_file import mat_arrays
+
+        try:
+            self._arrays = mat_arrays(path.read_bytes())
+        except _DAMAGE as error:
+            raise _damaged(path, error) from error
+        super().__init__(path, {name: array.shape for name, array in self._arrays.items()})
+
+    def _load(self, keys: Sequence[str]) -> Mapping[str, np.ndarray]:
+        try:
+            return {key: self._arrays[key].values() for key in keys}
+        except _DAMAGE as error:
+            raise _damaged(self.path, error) from error
+
+
+class OldMatTable(ArrayTable):
+    """A MATLAB file of version 4."""
+
+    def __init__(self, path: Path) -> None:
+        from scipy.io import loadmat
+        from scipy.io.matlab import MatReadError
 
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
-                shapes = {name: shape for name, shape, kind in whosmat(path) if kind not in {"struct", "cell", "char"}}
-        except _DAMAGE as error:
+                content = loadmat(path)
+        except (*_DAMAGE, MatReadError) as error:
             raise _damaged(path, error) from error
+        self._arrays = {name: array for name, array in content.items() if isinstance(array, np.ndarray)}
+        shapes = {name: array.shape for name, array in self._arrays.items() if array.dtype.kind in _NUMERIC}
         super().__init__(path, shapes)
 
     def _load(self, keys: Sequence[str]) -> Mapping[str, np.ndarray]:
-        from scipy.io import loadmat
-
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
-                content = loadmat(self.path, variable_names=list(keys))
-                return {key: np.asarray(content[key]) for key in keys}
-        except _DAMAGE as error:
-            raise _damaged(self.path, error) from error
+        return {key: self._arrays[key] for key in keys}
 
 
 def refuse_hdf5(path: Path) -> RecordingError:

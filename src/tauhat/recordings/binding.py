@@ -93,15 +93,25 @@ class BoundLog:
         first : row of the file that raw row 0 is
         """
         low, high = window[0] - first, window[1] - first
-        signals: dict[str, Any] = {
+        with np.errstate(over="ignore", invalid="ignore"):  # corrupt numbers may overflow; checks find them later
+            signals = self._signals(raw, low, high)
+            t = self._time(raw, window, low)
+        self._check_widths(signals)
+        return Log(
+            t=t,
+            **signals,
+            joint_names=self.joint_names,
+            units=self._units(),
+            name=self.path.name.split(".")[0] or self.path.name,
+            path=str(self.path),
+            first_row=window[0],
+        )
+
+    def _signals(self, raw: FloatArray, low: int, high: int) -> dict[str, Any]:
+        return {
             _FIELDS[kind]: _joint_side(_undelayed(raw[:, self.slots[kind]], signal, low, high), signal, self.log_map)
             for kind, signal in self.log_map.signals().items()
         }
-        self._check_widths(signals)
-        return Log(
-            t=self._time(raw, window, low), **signals, joint_names=self.joint_names, units=self._units(),
-            name=self.path.name.split(".")[0] or self.path.name, path=str(self.path), first_row=window[0],
-        )  # fmt: skip
 
     def _time(self, raw: FloatArray, window: tuple[int, int], low: int) -> FloatArray:
         if self.clock is None:

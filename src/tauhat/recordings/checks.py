@@ -9,7 +9,7 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.recordings.clock_checks import check_clock
 from tauhat.recordings.findings import SEVERITIES, Finding
-from tauhat.recordings.log import Log
+from tauhat.recordings.log import LARGEST_TIME, Log
 from tauhat.recordings.recording import FEWEST_SAMPLES, LARGEST_VALUE
 from tauhat.recordings.unit_checks import check_units, check_velocity
 from tauhat.recordings.value_checks import (
@@ -72,7 +72,7 @@ def check_limits(log: Log, robot: Robot) -> tuple[Finding, ...]:
 
 def sound_rows(log: Log) -> np.ndarray:
     """Return a mask of the rows whose numbers are possible and whose time is later than all before, (n_t,)."""
-    sound = np.isfinite(log.t)
+    sound = np.abs(log.t) <= LARGEST_TIME
     for signal in log.signals().values():
         with np.errstate(invalid="ignore"):
             sound &= (np.isfinite(signal) & (np.abs(signal) <= LARGEST_VALUE)).all(axis=1)

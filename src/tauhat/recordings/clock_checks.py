@@ -6,7 +6,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.recordings.findings import Finding
-from tauhat.recordings.log import Log
+from tauhat.recordings.log import LARGEST_TIME, Log
 
 _GAP = 3.0  # steps longer than this many median steps are gaps
 _HARMLESS_GAPS = (0.01, 20.0)  # part of the steps, and length in median steps, below which gaps are only noted
@@ -16,7 +16,7 @@ _STEPS = (2e-5, 0.2)  # [s] shortest and longest step of a controller's log
 
 def check_clock(log: Log) -> list[Finding]:
     """Return what is wrong with the time stamps of a log of at least two samples."""
-    finite = np.flatnonzero(np.isfinite(log.t))
+    finite = np.flatnonzero(np.abs(log.t) <= LARGEST_TIME)
     steps = np.diff(log.t[finite])
     after = finite[1:]
     if not (steps > 0).any():

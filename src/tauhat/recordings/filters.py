@@ -1,9 +1,9 @@
 """Zero-phase low-pass filters and differentiators of finite length, applied to whole matrices of signals.
 
 A Butterworth filter run forwards and backwards has the zero-phase response `|H(f)|^2`. Its impulse response is
-symmetric and dies out, so it is kept here as a finite symmetric kernel: the same operator can then be applied chunk by chunk, to
-every regressor column and to the torque alike, together with the decimation (the parallel filter). Derivatives are the
-same response times `2 pi i f`, so position, velocity and acceleration belong together.
+symmetric and dies out, so it is kept here as a finite symmetric kernel: the same operator can then be applied chunk by
+chunk, to every regressor column and to the torque alike, together with the decimation (the parallel filter).
+Derivatives are the same response times `2 pi i f`, so position, velocity and acceleration belong together.
 
 Source: Gautier, "Dynamic identification of robots with power model", 1997 (parallel filter and decimation).
 """

@@ -12,6 +12,7 @@ from tauhat.arrays import FloatArray, read_only
 from tauhat.errors import RecordingError, TauhatWarning
 from tauhat.recordings.recording import FEWEST_SAMPLES, LARGEST_VALUE, Recording, Source
 
+LARGEST_TIME = 1e19  # [s] more than nanoseconds since 1970 taken for seconds
 SIGNALS = ("q", "dq", "ddq", "tau", "temperature", "wrench")
 _CHECK = "`tauhat check` lists all such rows"
 
@@ -92,12 +93,13 @@ class Log:
                     got=f"{signal[sample, column]} ({np.count_nonzero(bad.any(axis=1))} such rows)",
                     remedy=f"remove the rows or choose others; {_CHECK}",
                 )  # fmt: skip
-            large = np.abs(signal) > LARGEST_VALUE
-            if name != "t" and large.any():
+            largest = LARGEST_TIME if name == "t" else LARGEST_VALUE
+            large = np.abs(signal) > largest
+            if large.any():
                 sample, column = (int(index) for index in np.argwhere(large)[0])
                 raise RecordingError(
                     f"{name} holds an impossible value", where=f"{self.place(sample)}, {self._column(name, column)}",
-                    expected=f"below {LARGEST_VALUE:g}", got=f"{signal[sample, column]:g}",
+                    expected=f"below {largest:g}", got=f"{signal[sample, column]:g}",
                     remedy="the row is corrupt, or the unit in the map is wrong",
                 )  # fmt: skip
 

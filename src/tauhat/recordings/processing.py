@@ -22,6 +22,7 @@ VelocitySource: TypeAlias = Literal["position", "velocity"]
 
 CHUNK = 4096
 ROWS_PER_CUTOFF = 4.0  # kept rows per second and hertz of cut-off: twice the band's own rate
+_NOISE_SPEEDS = 5.0
 STANDSTILL = 0.02  # part of the largest speed below which a joint counts as standing
 GAP_STEPS = 20.0  # a step of the clock longer than this many usual ones is a gap that cannot be bridged
 
@@ -78,9 +79,11 @@ def clock_step(recording: Recording) -> float:
     """Return the step of the uniform clock: the tenth percentile of the recording's steps [s].
 
     A controller that loses samples leaves steps of two or three periods between those of one: mean and median would
-    then be coarser than the log is where it is whole.
+    then be coarser than the log is where it is whole. Never less than a quarter of the mean step: bunched time stamps
+    say nothing about the clock.
     """
-    return float(np.quantile(np.diff(recording.t), 0.1))
+    steps = np.diff(recording.t)
+    return float(max(np.quantile(steps, 0.1), 0.25 * steps.mean()))
 
 
 class Clock(NamedTuple):
@@ -92,7 +95,7 @@ class Clock(NamedTuple):
 
     def ticks(self, begin: int, end: int) -> FloatArray:
         """Return the times of ticks `begin` to `end`, end excluded."""
-        return self.start + self.step * np.arange(begin, end)
+        return np.asarray(self.start + self.step * np.arange(begin, end), dtype=np.float64)
 
 
 def uniform_clock(recording: Recording, delay: float = 0.0) -> Clock:
@@ -106,19 +109,28 @@ def uniform_clock(recording: Recording, delay: float = 0.0) -> Clock:
 def moving_window(recording: Recording) -> tuple[float, float]:
     """Return the times between which the robot moves [s]: standstill at both ends left out.
 
-    A joint moves when its speed over 50 ms exceeds 2 % of the largest in the recording. A recording without motion is
-    kept whole.
+    A joint moves when its speed over 50 ms exceeds 2 % of its largest in the recording and five times what its
+    encoder's noise alone would make. A recording without motion is kept whole.
     """
     q = unwrapped(recording.q)
     span = max(1, round(0.05 / clock_step(recording)))
     if recording.n_t <= 2 * span:
         return float(recording.t[0]), float(recording.t[-1])
     speed = np.abs(q[span:] - q[:-span]) / (recording.t[span:] - recording.t[:-span])[:, None]
-    largest = speed.max(axis=0)
-    moving = np.flatnonzero((speed > STANDSTILL * np.where(largest > 0, largest, np.inf)).any(axis=1))
+    noise = white_noise(q) * np.sqrt(2.0) / (span * clock_step(recording))
+    threshold = np.maximum(STANDSTILL * speed.max(axis=0), _NOISE_SPEEDS * noise)
+    moving = np.flatnonzero((speed > threshold).any(axis=1))
     if not moving.size:
         return float(recording.t[0]), float(recording.t[-1])
     return float(recording.t[moving[0]]), float(recording.t[min(moving[-1] + span, recording.n_t - 1)])
+
+
+def white_noise(signal: FloatArray) -> FloatArray:
+    """Return the deviation of the white part of each column of `signal` (n_t, n), by its fourth differences.
+
+    White noise of deviation s gives fourth differences of deviation `sqrt(70) s`; the median is robust against motion.
+    """
+    return np.asarray(np.median(np.abs(np.diff(signal, 4, axis=0)), axis=0) / (0.6745 * np.sqrt(70.0)))
 
 
 def unwrapped(q: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tauhat.errors import RecordingError
 from tauhat.files import existing_file
-from tauhat.recordings.array_table import HDF5_MAGIC, NPZ_MAGIC, MatTable, NpzTable, refuse_hdf5
+from tauhat.recordings.array_table import HDF5_MAGIC, NPZ_MAGIC, MatTable, NpzTable, OldMatTable, refuse_hdf5
 from tauhat.recordings.parquet_table import PARQUET_MAGIC, ParquetTable
 from tauhat.recordings.table import InterleavedTable, Table
 from tauhat.recordings.text_table import TextTable
@@ -35,7 +35,7 @@ def open_table(path: str | Path, *, interleaved: int | None = None) -> Table:
 def _open_by_content(path: Path) -> Table:
     try:
         with path.open("rb") as file:
-            head = file.read(16)
+            head = file.read(128)
     except OSError as error:
         raise RecordingError("cannot be read", where=path, got=error.strerror or error) from error
     if not head:
@@ -46,6 +46,8 @@ def _open_by_content(path: Path) -> Table:
         return NpzTable(path)
     if head.startswith((HDF5_MAGIC, _MAT_73)):
         raise refuse_hdf5(path)
-    if head.startswith(_MAT_MAGIC) or path.suffix.lower() == ".mat":
+    if head.startswith(_MAT_MAGIC) or head[126:128] in {b"IM", b"MI"}:
         return MatTable(path)
+    if path.suffix.lower() == ".mat":
+        return OldMatTable(path)
     return TextTable(path)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.recordings.findings import Finding
-from tauhat.recordings.log import Log
+from tauhat.recordings.log import LARGEST_TIME, Log
 from tauhat.recordings.recording import LARGEST_VALUE
 
 STANDING = {"rad": 1e-3, "m": 1e-4}  # travel below which a joint stands
@@ -28,12 +28,15 @@ def check_corrupt(log: Log) -> list[Finding]:
         broken |= ~np.isfinite(signal).all(axis=1)
     if broken.any():
         found.append(_rows("corrupt_rows", log, broken, "hold no number (empty, NaN or infinite)"))
-    absurd = np.zeros(log.n_t, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        absurd = np.isfinite(log.t) & (np.abs(log.t) > LARGEST_TIME)
     for signal in log.signals().values():
         with np.errstate(invalid="ignore"):
             absurd |= (np.isfinite(signal) & (np.abs(signal) > LARGEST_VALUE)).any(axis=1)
     if absurd.any():
-        found.append(_rows("impossible_values", log, absurd, f"hold a value above {LARGEST_VALUE:g}"))
+        found.append(
+            _rows("impossible_values", log, absurd, f"hold a value no joint reaches (above {LARGEST_VALUE:g})")
+        )
     return found
 
 

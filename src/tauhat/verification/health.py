@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tauhat.arrays import FloatArray
+from tauhat.blas import single_threaded
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.rigid_body import inverse_dynamics
@@ -45,6 +46,7 @@ class _Look:
     tau: FloatArray
 
 
+@single_threaded
 def check_recording(model: TorqueModel, recording: Recording, *, cutoff: float | None = None) -> tuple[Finding, ...]:
     """Return what a torque model says about a log: sign, delay, excitation, units.
 
@@ -72,7 +74,7 @@ def _look(recording: Recording, estimate: Estimate) -> _Look:
     q, dq, ddq = (np.concatenate([getattr(piece, name) for piece in pieces], axis=1).T for name in ("q", "dq", "ddq"))
     return _Look(
         recording=recording, model=estimate.model, base=estimate.base, estimate=estimate, q=q, dq=dq, ddq=ddq, tau=tau.T
-    )  # fmt: skip
+    )
 
 
 def power_coherence(tau: FloatArray, dq: FloatArray) -> FloatArray:
@@ -95,25 +97,32 @@ def _sign_findings(look: _Look) -> tuple[Finding, ...]:
         listed = ", ".join(name for name, bad in zip(names, reversed_joints, strict=True) if bad)
         return (
             Finding(
-                code="torque-sign", severity="error", number=float(coherence.mean()),
+                code="torque-sign",
+                severity="error",
+                number=float(coherence.mean()),
                 message=f"the torque is logged with the sign reversed: friction seems to drive the motors on "
-                f"{int(reversed_joints.sum())} of {len(names)} joints ({listed}; power balance {coherence.mean():+.2f})",
+                f"{int(reversed_joints.sum())} of {len(names)} joints ({listed}; balance {coherence.mean():+.2f})",
                 advice="set `sign = -1` in the map's [torque] section",
             ),
-        )  # fmt: skip
+        )
     doubtful = tuple(
         Finding(
-            code="torque-sign", severity="warning", joint=names[joint], number=float(coherence[joint]),
+            code="torque-sign",
+            severity="warning",
+            joint=names[joint],
+            number=float(coherence[joint]),
             message=f"{names[joint]}: friction comes out negative (power balance {coherence[joint]:+.2f}): torque or "
             "position of this joint may have the sign reversed",
             advice="compare with the sign of gravity at a held pose; `sign` in the map takes one value a joint",
         )
         for joint in np.flatnonzero(reversed_joints)
-    )  # fmt: skip
+    )
     good = Finding(
-        code="torque-sign", severity="ok", number=float(coherence.mean()),
+        code="torque-sign",
+        severity="ok",
+        number=float(coherence.mean()),
         message=f"torque and motion have consistent signs (power balance {coherence.mean():+.2f})",
-    )  # fmt: skip
+    )
     return doubtful or (good,)
 
 
@@ -139,11 +148,13 @@ def _delay_findings(look: _Look) -> tuple[Finding, ...]:
         )
     late = "position is late against the torque" if delay.samples > 0 else "torque is late against the position"
     finding = Finding(
-        code="torque-delay", severity="warning", number=delay.samples,
-        message=f"{late} by about {abs(delay.samples):.2g} samples ({abs(delay.seconds) * 1e3:.3g} ms): the residual falls "
-        f"by {100 * delay.drop:.0f} % when it is shifted",
+        code="torque-delay",
+        severity="warning",
+        number=delay.samples,
+        message=f"{late} by about {abs(delay.samples):.2g} samples ({abs(delay.seconds) * 1e3:.3g} ms): "
+        f"the residual falls by {100 * delay.drop:.0f} % when it is shifted",
         advice="`identify` compensates it by itself; to fix it, set `delay_samples` in the map's [position] section",
-    )  # fmt: skip
+    )
     return (finding,)
 
 
@@ -157,20 +168,24 @@ def _excitation_findings(look: _Look) -> tuple[Finding, ...]:
         lost = f"{unseen} of {estimate.base.n_b} base parameters cannot be seen at all; " if unseen else ""
         return (
             Finding(
-                code="excitation", severity="warning", number=number,
-                message=f"the motion is too weak for this model: {lost}scaled condition number {number:.3g} (doubtful above "
-                f"{DOUBTFUL_CONDITION:g}); least certain: {names or 'none'}",
+                code="excitation",
+                severity="warning",
+                number=number,
+                message=f"the motion is too weak for this model: {lost}scaled condition number {number:.3g} "
+                f"(doubtful above {DOUBTFUL_CONDITION:g}); least certain: {names or 'none'}",
                 advice="record a motion that moves all joints together and fast, or ask for a smaller model (--model)",
             ),
-        )  # fmt: skip
+        )
     severity: Severity = "note" if number > _WEAK_CONDITION else "ok"
     return (
         Finding(
-            code="excitation", severity=severity, number=number,
+            code="excitation",
+            severity=severity,
+            number=number,
             message=f"the motion supports the model: scaled condition number {number:.3g}, {len(weak)} of "
             f"{estimate.base.n_b} base parameters with more than {100 * WEAK_PARAMETER:.0f} % standard error",
         ),
-    )  # fmt: skip
+    )
 
 
 def _unit_findings(look: _Look) -> tuple[Finding, ...]:
@@ -189,9 +204,12 @@ def _unit_findings(look: _Look) -> tuple[Finding, ...]:
         if abs(correlation) > _LEAST_CORRELATION and not 1.0 / _LARGEST_RATIO < ratio < _LARGEST_RATIO:
             findings.append(
                 Finding(
-                    code="torque-unit", severity="warning", joint=name, number=ratio,
+                    code="torque-unit",
+                    severity="warning",
+                    joint=name,
+                    number=ratio,
                     message=f"{name}: torque has the shape of the nominal model's but {ratio:.3g} times its size",
                     advice="is it motor side, in amperes or in counts? set `gain` in the map's [torque] section",
                 )
-            )  # fmt: skip
+            )
     return tuple(findings)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tauhat.arrays import FloatArray, read_only
+from tauhat.blas import single_threaded
 from tauhat.errors import ModelError
 from tauhat.estimation.estimate import Estimate
 from tauhat.estimation.rows import filtered_rows
@@ -95,6 +96,7 @@ class Verification:
         return {"logs": [log.to_dict() for log in self.logs], "processing": self.processing.to_dict()}
 
 
+@single_threaded
 def verify(
     estimate: Estimate, recordings: Sequence[Recording], *, processing: Processing | None = None
 ) -> Verification:

@@ -14,8 +14,10 @@ from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.terms import INERTIAL_SYMBOLS
 from tauhat.errors import ModelError
 from tauhat.estimation.estimate import Estimate
+from tauhat.recordings.recording import Recording
 from tauhat.simulation.experiment import Truth
 from tauhat.simulation.parameters import TrueParameters
+from tauhat.verification.prediction import predict_recording
 
 CONFIDENCE = 0.95
 _DRIVE_SYMBOLS: Mapping[str, str] = {"Ia": "rotor", "Fv": "viscous", "Fc": "coulomb", "To": "offset"}
@@ -27,14 +29,15 @@ class TruthComparison:
 
     values : (n_b,) true base parameters
     inside : (n_b,) whether the truth lies in the estimate's 95 % interval
-    relative_rms : norm of the error over norm of the true, noise-free torque, all joints stacked
-    joints : (n_v,) the same joint by joint
+    relative_rms : norm of the error over norm of the true, noise-free torque, all joints stacked, through the filters
+        of the estimate
+    joints : the same joint by joint
     """
 
     values: FloatArray
     inside: NDArray[np.bool_]
     relative_rms: float
-    joints: FloatArray
+    joints: tuple[float, ...]
 
     @property
     def share_inside(self) -> float:
@@ -45,7 +48,7 @@ class TruthComparison:
         """Return plain data."""
         return {
             "relative_rms": self.relative_rms,
-            "joints": self.joints.tolist(),
+            "joints": list(self.joints),
             "inside_95": int(self.inside.sum()),
             "base_parameters": int(self.inside.size),
             "share_inside_95": self.share_inside,
@@ -82,11 +85,22 @@ def compare_with_truth(estimate: Estimate, truth: Truth) -> TruthComparison:
 
     values = estimate.base.projection @ standard_parameters(estimate.model, truth.parameters)
     reach = float(stdtrit(max(1, estimate.degrees), 0.5 + 0.5 * CONFIDENCE))
-    error = estimate.predict(truth.q, truth.dq, truth.ddq) - truth.tau
-    size = np.linalg.norm(truth.tau, axis=0)
+    prediction = predict_recording(estimate, _noise_free(estimate, truth), processing=estimate.processing)
     return TruthComparison(
         values=read_only(values),
         inside=read_only(np.abs(estimate.values - values) <= reach * estimate.standard_errors),
-        relative_rms=float(np.linalg.norm(error) / np.linalg.norm(truth.tau)),
-        joints=read_only(np.linalg.norm(error, axis=0) / np.where(size > 0, size, np.inf)),
+        relative_rms=prediction.relative_rms,
+        joints=tuple(joint.relative_rms for joint in prediction.joints),
+    )
+
+
+def _noise_free(estimate: Estimate, truth: Truth) -> Recording:
+    """Return the recording that perfect sensors would have made."""
+    return Recording(
+        t=truth.reference.t,
+        q=truth.q,
+        dq=truth.dq,
+        tau=truth.tau,
+        joint_names=estimate.robot.joint_names,
+        name="truth",
     )

@@ -1,0 +1,113 @@
+"""Prediction error on measured logs of eight real robots, beside the reference error of one plain baseline.
+
+    python benchmarks/real.py [--json] [--data FOLDER] [--auto-cutoff]
+
+Every case goes through the command line as a user would: `tauhat identify`, then `tauhat verify` on logs that were not
+fitted (unless the case says so), with one set of defaults for all robots and the reference's own cut-off. The logs are
+not part of the project; their folder is named by --data or TAUHAT_REAL_DATA.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from pathlib import Path
+from typing import Any
+
+EXAMPLES = Path(__file__).parent.parent / "examples" / "real"
+
+
+def default_data() -> Path:
+    beside = Path(__file__).parent.parent.parent / "shared" / "data"
+    return Path(os.environ.get("TAUHAT_REAL_DATA", beside))
+
+
+def read_cases() -> list[dict[str, Any]]:
+    return tomllib.loads((EXAMPLES / "cases.toml").read_text(encoding="utf-8"))["case"]
+
+
+def tauhat(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run one command; a failing one stops the benchmark with its message."""
+    command = [sys.executable, "-m", "tauhat", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(arguments)}\n{done.stderr}")
+    return done
+
+
+def arguments_of(logs: list[dict[str, str]], data: Path, case: dict[str, Any], map_name: str) -> list[str]:
+    """Command-line arguments for logs that share a window, a map and a cut-off."""
+    windows = {log.get("rows") for log in logs}
+    if len(windows) != 1:
+        raise SystemExit(f"{case['name']}: logs of one call share one window")
+    rows = windows.pop()
+    return [
+        *(str(data / log["log"]) for log in logs), "--map", str(EXAMPLES / map_name), "--cutoff", str(case["cutoff"]),
+        *(["--rows", rows] if rows else []),
+    ]  # fmt: skip
+
+
+def run_case(case: dict[str, Any], data: Path, folder: Path) -> dict[str, Any]:
+    """Identify and verify one case; return its errors."""
+    robot = EXAMPLES / case["robot"] if (EXAMPLES / case["robot"]).exists() else data / case["robot"]
+    estimate = folder / "estimate.json"
+    start = time.perf_counter()
+    fitted = tauhat("identify", str(robot), *arguments_of(case["fit"], data, case, case["map"]), "-o", str(estimate))
+    seconds = time.perf_counter() - start
+    judge_map = case.get("judge_map", case["map"])
+    judged = tauhat("verify", str(estimate), *arguments_of(case["judge"], data, case, judge_map), "--json")
+    logs = json.loads(judged.stdout)["logs"]
+    stored = json.loads(estimate.read_text(encoding="utf-8"))
+    warnings = [line for line in fitted.stderr.splitlines() if line.startswith("warning")]
+    return {
+        "name": case["name"], "errors": [log["relative_rms"] for log in logs], "reference": case["reference"],
+        "joints": [[joint["relative_rms"] for joint in log["joints"]] for log in logs], "seconds": seconds,
+        "condition": stored["fit"]["condition"], "processing": stored["processing"], "warnings": warnings,
+        "missing_warnings": [word for word in case.get("expect", ()) if word not in " ".join(warnings)],
+        "waits": case.get("waits", ""),
+    }  # fmt: skip
+
+
+def percent(values: list[float]) -> str:
+    return " ".join(f"{100 * value:.2f}" for value in values)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--data", type=Path, default=default_data())
+    parser.add_argument("--only", default="", help="only cases whose name contains this")
+    options = parser.parse_args()
+    if not options.data.is_dir():
+        raise SystemExit(f"{options.data}: no such folder; name the folder of the recordings with --data")
+    cases = [case for case in read_cases() if options.only in case["name"]]
+    with tempfile.TemporaryDirectory() as folder:
+        results = [run_case(case, options.data, Path(folder)) for case in cases]
+    if options.json:
+        print(json.dumps(results))
+        return
+    print(
+        f"{'fitted -> judged':34} {'reference %':>12} {'here %':>12} {'verdict':>8} {'cond':>8} {'s':>5}  per joint %"
+    )
+    for row in results:
+        met = all(error <= reference for error, reference in zip(row["errors"], row["reference"], strict=True))
+        verdict = "met" if met else "NOT MET"
+        joints = " | ".join(" ".join(f"{100 * value:.0f}" for value in joints) for joints in row["joints"])
+        print(
+            f"{row['name']:34} {percent(row['reference']):>12} {percent(row['errors']):>12} {verdict:>8} "
+            f"{row['condition']:8.3g} {row['seconds']:5.1f}  {joints}"
+        )
+        if row["waits"]:
+            print(f"{'':34} the model does not have yet: {row['waits']}")
+        for missing in row["missing_warnings"]:
+            print(f"{'':34} MISSING WARNING: {missing}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,5 @@
+"""`python -m tauhat`: the command line."""
+
+from tauhat.cli.app import main
+
+main()

@@ -1,0 +1,64 @@
+"""From the words of the command line to the objects of the library."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tauhat.errors import TauhatWarning
+
+if TYPE_CHECKING:
+    from tauhat.cli.options import Window
+    from tauhat.estimation.estimate import Estimate, InputLog
+    from tauhat.recordings.processing import Processing
+    from tauhat.recordings.recording import Recording, Source
+    from tauhat.robots.robot import Robot
+
+
+def read_recordings(logs: Sequence[Path], *, map_file: Path | None, rows: Window | None) -> tuple[Recording, ...]:
+    """Return the logs as recordings, all through the same map and window."""
+    from tauhat.recordings.reading import read_recording
+
+    return tuple(read_recording(log, map=map_file, rows=rows) for log in logs)
+
+
+def robot_of_recordings(name: str, recordings: Sequence[Recording], *, locked: Mapping[str, float] | None) -> Robot:
+    """Return the robot, fitted to the joints that the recordings have."""
+    from tauhat.robots.fitting import check_joint_order, fit_to_joints
+    from tauhat.robots.library import load_robot
+
+    robot = load_robot(name, locked=locked)
+    robot = fit_to_joints(robot, recordings[0].joint_names, where=recordings[0].name)
+    for recording in recordings:
+        check_joint_order(robot, recording.joint_names, where=recording.name)
+    return robot
+
+
+def recordings_of_estimate(
+    estimate: Estimate, logs: Sequence[Path], *, map_file: Path | None, rows: Window | None
+) -> tuple[Recording, ...]:
+    """Return the logs as recordings whose joints are those of the estimate."""
+    from tauhat.robots.fitting import check_joint_order
+
+    recordings = read_recordings(logs, map_file=map_file, rows=rows)
+    for recording in recordings:
+        check_joint_order(estimate.robot, recording.joint_names, where=recording.name)
+        if any(_overlap(known, recording.source) for known in estimate.inputs):
+            message = f"{recording.name} is one of the logs the estimate was fitted on: its error there proves little"
+            warnings.warn(message, TauhatWarning, stacklevel=2)
+    return recordings
+
+
+def _overlap(known: InputLog, source: Source | None) -> bool:
+    """Return whether rows of a file went into the fit."""
+    if source is None or source.sha256 != known.sha256:
+        return False
+    return max(known.rows[0], source.rows[0]) < min(known.rows[1], source.rows[1])
+
+
+def processing_of(estimate: Estimate, *, cutoff: float | None) -> Processing:
+    """Return the filters of the estimate, with another cut-off where one is given [Hz]."""
+    return estimate.processing if cutoff is None else replace(estimate.processing, cutoff=cutoff)

@@ -1,0 +1,121 @@
+"""Arguments and options that several commands share, each with one name and one help text."""
+
+from __future__ import annotations
+
+import math
+from collections import UserDict
+from pathlib import Path
+from typing import Annotated, NamedTuple, TypeAlias
+
+import typer
+
+from tauhat.errors import TauhatError
+
+TERM_NAMES = "inertia,rotor,viscous,coulomb,offset"
+
+
+class Window(NamedTuple):
+    """Rows of a log: zero-based, end excluded, None for the end of the file."""
+
+    start: int
+    stop: int | None
+
+
+class Locks(UserDict[str, float]):
+    """Joint name -> position at which to freeze it [rad or m]."""
+
+
+def window(text: str) -> Window:
+    """Return the rows that FROM:TO names."""
+    from tauhat.recordings.logmap import parse_rows
+
+    try:
+        return Window(*parse_rows(text))
+    except TauhatError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def locks(text: str) -> Locks:
+    """Return the joints that NAME[=VALUE],... names; without a value a joint is frozen at zero."""
+    positions = Locks()
+    for item in text.split(","):
+        name, equals, value = (part.strip() for part in item.partition("="))
+        if not name:
+            raise typer.BadParameter(f"no joint name in {item!r}; expected NAME or NAME=VALUE")
+        try:
+            positions[name] = float(value) if equals else 0.0
+        except ValueError as error:
+            raise typer.BadParameter(f"position of {name} is not a number: {value!r}") from error
+    return positions
+
+
+def frequency(text: str) -> float:
+    """Return a positive frequency [Hz]."""
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise typer.BadParameter(f"not a number: {text!r}") from error
+    if not 0.0 < value < math.inf:
+        raise typer.BadParameter(f"not a positive frequency: {text}")
+    return value
+
+
+RobotArgument: TypeAlias = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT", help="Built-in name (see `tauhat robots`), .urdf file or .toml DH table.", show_default=False
+    ),
+]
+EstimateArgument: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="ESTIMATE", help="Estimate file written by `tauhat identify`.", show_default=False)
+]
+LogArguments: TypeAlias = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOG...", help="Recordings: CSV (also .gz), Parquet, NPZ or MAT.", show_default=False),
+]
+MapOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--map",
+        metavar="MAP.toml",
+        help="What the columns mean; by default the map beside each log.",
+        show_default=False,
+    ),
+]
+RowsOption: TypeAlias = Annotated[
+    Window | None,
+    typer.Option(
+        "--rows",
+        metavar="FROM:TO",
+        parser=window,
+        help="Window of rows of each log, zero-based, end excluded.",
+        show_default=False,
+    ),
+]
+CutoffOption: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        "--cutoff",
+        metavar="HZ",
+        parser=frequency,
+        help="Low-pass of torque and model.",
+        show_default="chosen from the data",
+    ),
+]
+ModelOption: TypeAlias = Annotated[
+    str, typer.Option("--model", metavar="TERMS", help="Terms of the torque model, comma separated.")
+]
+LockOption: TypeAlias = Annotated[
+    Locks | None,
+    typer.Option(
+        "--lock",
+        metavar="NAME[=VALUE],...",
+        parser=locks,
+        help="Freeze joints of the robot, e.g. a gripper's, at VALUE or 0 [rad or m].",
+        show_default=False,
+    ),
+]
+SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
+JsonOption: TypeAlias = Annotated[
+    bool, typer.Option("--json", help="Print one JSON document on standard output and nothing else.")
+]

@@ -1,0 +1,34 @@
+"""What goes to standard output: one JSON document, or views for people."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+def show(document: Mapping[str, Any], view: Callable[[], Iterable[RenderableType]], *, as_json: bool) -> None:
+    """Print a result: its document as JSON, or what `view` makes of it."""
+    if as_json:
+        typer.echo(json.dumps(without_infinities(document), indent=1, allow_nan=False))
+        return
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    for part in view():
+        console.print(part)
+
+
+def without_infinities(value: Any) -> Any:
+    """Return plain data with null for every number that JSON cannot hold."""
+    if isinstance(value, Mapping):
+        return {key: without_infinities(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_infinities(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
