@@ -32,7 +32,7 @@ LEVELS = {
     name: level
     for level, names in enumerate(
         [
-            ("", "errors"),
+            ("", "errors", "blas"),
             ("arrays",),
             ("files",),
             ("robots",),

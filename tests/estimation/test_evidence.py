@@ -15,7 +15,7 @@ from tauhat.errors import ModelError, RecordingError
 from tauhat.estimation import Evidence, OrdinaryLeastSquares, WeightedLeastSquares, collect, collect_all
 from tauhat.estimation.evidence import MOST_BLOCKS, evidence_from_rows
 from tauhat.estimation.rows import Rows, filtered_rows
-from tauhat.estimation.solution import joint_residuals, joint_torques, solve
+from tauhat.estimation.solution import joint_residuals, joint_torques, rank_and_condition
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 
@@ -106,7 +106,7 @@ def test_residuals_torques_and_condition_are_those_of_all_rows():
     error = (matrix @ values - torque) ** 2
     assert close(joint_residuals(evidence(0), values), np.sqrt([error[joint == k].mean() for k in range(2)]))
     assert close(joint_torques(evidence(0)), np.sqrt([(torque[joint == k] ** 2).mean() for k in range(2)]))
-    _, rank, condition = solve(evidence(0), np.ones(2), ridge=0.0)
+    rank, condition = rank_and_condition(evidence(0), np.ones(2))
     assert rank == base().n_b
     assert condition == pytest.approx(np.linalg.cond(matrix / np.linalg.norm(matrix, axis=0)), rel=1e-9)
 

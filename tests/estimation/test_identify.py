@@ -168,7 +168,7 @@ def test_torque_that_is_zero_everywhere_is_refused():
 
 def test_a_recording_too_short_for_its_filter_is_refused_with_its_rows():
     with pytest.raises(
-        ModelError, match=r"^8 filtered rows cannot determine 13 base parameters; give a longer recording"
+        ModelError, match=r"^6 filtered rows cannot determine 13 base parameters; give a longer recording"
     ):
         identify(TRUTH.model, [TRUTH.recording(seconds=1.0)], processing=Processing(cutoff=1.0, motion_cutoff=30.0))
 

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 from sample_arms import autocorrelated_noise, planar_truth
 from tauhat.dynamics import base_parameters
 from tauhat.estimation import OrdinaryLeastSquares, collect, identify
-from tauhat.estimation.solution import Solution
+from tauhat.estimation.solution import Solution, time_groups
 from tauhat.recordings.processing import Processing
 
 SETTINGS = Processing(cutoff=10.0, motion_cutoff=30.0)
@@ -69,24 +69,27 @@ def test_the_white_noise_formula_does_not_cover_when_residuals_are_autocorrelate
 def fitted(seed: int) -> tuple[Solution, int]:
     base = base_parameters(TRUTH.model)
     evidence = collect(TRUTH.model, base, TRUTH.recording(noise=coloured_noise(seed)), SETTINGS)
-    return OrdinaryLeastSquares().fit(evidence), len(evidence.blocks)
+    return OrdinaryLeastSquares().fit(evidence), len(time_groups(evidence))
 
 
-def test_errors_are_those_of_solving_without_each_block():
+def test_errors_are_those_of_solving_without_each_group_of_blocks():
     base = base_parameters(TRUTH.model)
     evidence = collect(TRUTH.model, base, TRUTH.recording(noise=coloured_noise(0)), SETTINGS)
     solution = OrdinaryLeastSquares().fit(evidence)
-    count = len(evidence.blocks)
-    moves = [OrdinaryLeastSquares().fit(evidence.without(k)).values - solution.values for k in range(count)]
+    groups = time_groups(evidence)
+    count = len(groups)
+    assert 8 <= count <= 16
+    rest = [replace(evidence, blocks=groups[:k] + groups[k + 1 :]) for k in range(count)]
+    moves = [OrdinaryLeastSquares().fit(part).values - solution.values for part in rest]
     spread = np.sqrt((count - 1) / count * np.sum(np.square(moves), axis=0))
     assert np.allclose(np.sqrt(np.diag(solution.covariance)), spread, rtol=1e-6)
 
 
-def test_covariance_is_symmetric_positive_definite_with_as_many_degrees_as_blocks_less_one():
-    solution, blocks = fitted(1)
+def test_covariance_is_symmetric_positive_definite_with_as_many_degrees_as_groups_less_one():
+    solution, groups = fitted(1)
     assert np.allclose(solution.covariance, solution.covariance.T)
     assert np.linalg.eigvalsh(solution.covariance).min() > 0
-    assert solution.degrees == blocks - 1
+    assert solution.degrees == groups - 1
 
 
 def test_errors_fall_with_the_square_root_of_the_time():

@@ -181,15 +181,15 @@ def test_unseen_and_fitted_logs_are_told_apart(
 ) -> None:
     estimate, verification = verified
     assert "on 2 recordings that were not used for the fit" in " ".join(page.text.split())
-    seen = replace(verification, logs=(replace(verification.logs[1], log=estimate.inputs[0].name),))
+    seen = replace(verification, logs=(replace(verification.logs[1], input=estimate.inputs[0]),))
     text = parsed(write_report(tmp_path / "r.html", estimate, verification=seen)).text
     assert "but not proven" in text
-    assert "name also in the fit" in text
+    assert "rows also in the fit" in text
 
 
 def test_the_first_unseen_log_is_the_one_unfolded(tmp_path: Path, verified: tuple[Estimate, Verification]) -> None:
     estimate, verification = verified
-    seen = replace(verification.logs[1], log=estimate.inputs[0].name)
+    seen = replace(verification.logs[1], input=estimate.inputs[0])
     both = replace(verification, logs=(seen, verification.logs[1]))
     html = write_report(tmp_path / "r.html", estimate, verification=both).read_text(encoding="utf-8")
     unfolded = re.findall(r'<details class="log" open>\s*<summary>(run \d)', html)

@@ -16,7 +16,7 @@ from tauhat.report.advice import next_steps, worst_joint
 from tauhat.report.case import Case, pooled_relative_rms
 from tauhat.report.formatting import number, percent, span, unit, value_and_half
 from tauhat.report.grading import condition_grade, grade_of
-from tauhat.report.uncertainty import half_intervals, relative_halves
+from tauhat.report.uncertainty import relative_halves
 from tauhat.verification import LogPrediction, Verification
 
 
@@ -66,7 +66,7 @@ def test_the_condition_number_is_graded_and_a_lost_rank_is_worse_than_any() -> N
 
 def test_intervals_are_those_of_students_t(estimate: Estimate) -> None:
     few = replace(estimate, degrees=5)
-    np.testing.assert_allclose(half_intervals(few), student.ppf(0.975, 5) * few.standard_errors)
+    np.testing.assert_allclose(few.half_intervals(), student.ppf(0.975, 5) * few.standard_errors)
 
 
 def test_a_parameter_that_is_zero_has_an_infinite_relative_interval(estimate: Estimate) -> None:
@@ -100,7 +100,7 @@ def test_advice_names_a_weak_motion(estimate: Estimate) -> None:
 def test_advice_asks_for_unseen_recordings(estimate: Estimate, verification: Verification) -> None:
     log = verification.logs[1]
     assert "Verify the model on a recording that it was not fitted to" in _steps(estimate)
-    assert "Verify on a recording of another motion" in _steps(estimate, replace(log, log=estimate.inputs[0].name))
+    assert "Verify on a recording of another motion" in _steps(estimate, replace(log, input=estimate.inputs[0]))
 
 
 def test_advice_sees_a_model_that_does_not_transfer(estimate: Estimate, verification: Verification) -> None:

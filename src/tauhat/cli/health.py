@@ -11,7 +11,7 @@ from tauhat.recordings.findings import SEVERITIES, Finding
 from tauhat.recordings.log import Log
 from tauhat.robots.fitting import fit_to_joints
 from tauhat.robots.robot import Robot
-from tauhat.verification.health import check_recording
+from tauhat.verification.health import check_axes, check_recording
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,7 +42,7 @@ def checked_log(log: Log, *, robot: Robot | None = None, terms: str | Iterable[s
     """
     checked = CheckedLog(log=log, findings=check_log(log))
     if robot is None:
-        return checked
+        return _with(checked, check_axes(log.recording())) if checked.usable and log.tau is not None else checked
     fitted = fit_to_joints(robot, log.joint_names, where=log.path)
     checked = _with(checked, check_limits(log, fitted))
     if not checked.usable or log.tau is None:

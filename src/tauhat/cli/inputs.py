@@ -12,9 +12,9 @@ from tauhat.errors import TauhatWarning
 
 if TYPE_CHECKING:
     from tauhat.cli.options import Window
-    from tauhat.estimation.estimate import Estimate, InputLog
+    from tauhat.estimation.estimate import Estimate
     from tauhat.recordings.processing import Processing
-    from tauhat.recordings.recording import Recording, Source
+    from tauhat.recordings.recording import Recording
     from tauhat.robots.robot import Robot
 
 
@@ -41,22 +41,16 @@ def recordings_of_estimate(
     estimate: Estimate, logs: Sequence[Path], *, map_file: Path | None, rows: Window | None
 ) -> tuple[Recording, ...]:
     """Return the logs as recordings whose joints are those of the estimate."""
+    from tauhat.estimation.estimate import input_log
     from tauhat.robots.fitting import check_joint_order
 
     recordings = read_recordings(logs, map_file=map_file, rows=rows)
     for recording in recordings:
         check_joint_order(estimate.robot, recording.joint_names, where=recording.name)
-        if any(_overlap(known, recording.source) for known in estimate.inputs):
+        if any(known.overlaps(input_log(recording)) for known in estimate.inputs):
             message = f"{recording.name} is one of the logs the estimate was fitted on: its error there proves little"
             warnings.warn(message, TauhatWarning, stacklevel=2)
     return recordings
-
-
-def _overlap(known: InputLog, source: Source | None) -> bool:
-    """Return whether rows of a file went into the fit."""
-    if source is None or source.sha256 != known.sha256:
-        return False
-    return max(known.rows[0], source.rows[0]) < min(known.rows[1], source.rows[1])
 
 
 def processing_of(estimate: Estimate, *, cutoff: float | None) -> Processing:

@@ -11,6 +11,7 @@ import typer
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+    from rich.text import Text
 
 
 def show(document: Mapping[str, Any], view: Callable[[], Iterable[RenderableType]], *, as_json: bool) -> None:
@@ -23,6 +24,13 @@ def show(document: Mapping[str, Any], view: Callable[[], Iterable[RenderableType
     console = Console(highlight=False)
     for part in view():
         console.print(part)
+
+
+def unbroken(text: str) -> Text:
+    """Return text whose lines are never wrapped: paths and commands that are copied."""
+    from rich.text import Text
+
+    return Text(text, no_wrap=True, overflow="ignore")
 
 
 def without_infinities(value: Any) -> Any:

@@ -18,6 +18,7 @@ from tauhat.dynamics.motion import motion_from_rows
 from tauhat.errors import EstimateError, TauhatError
 from tauhat.files import read_text, replace_file
 from tauhat.recordings.processing import Processing
+from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot
 
 SCHEMA = "tauhat/estimate"
@@ -34,6 +35,25 @@ class InputLog:
     rows: tuple[int, int]
     samples: int
     seconds: float
+
+    def overlaps(self, other: InputLog) -> bool:
+        """Return whether the two share rows of the same file; without hashes, whether they have the same name."""
+        if not (self.sha256 and other.sha256):
+            return self.name == other.name
+        shared = min(self.rows[1], other.rows[1]) > max(self.rows[0], other.rows[0])
+        return self.sha256 == other.sha256 and shared
+
+
+def input_log(recording: Recording) -> InputLog:
+    """Return what an estimate or a verification notes of a recording."""
+    source = recording.source
+    return InputLog(
+        name=recording.name,
+        sha256=source.sha256 if source else "",
+        rows=source.rows if source else (0, recording.n_t),
+        samples=recording.n_t,
+        seconds=recording.duration,
+    )
 
 
 class ParameterRow(NamedTuple):
@@ -98,6 +118,12 @@ class Estimate:
     def standard_errors(self) -> FloatArray:
         """Standard errors of the base parameters, (n_b,)."""
         return np.sqrt(np.diag(self.covariance))
+
+    def half_intervals(self, *, confidence: float = 0.95) -> FloatArray:
+        """Return half of each base parameter's confidence interval, (n_b,), by Student's t."""
+        from scipy.special import stdtrit
+
+        return np.asarray(float(stdtrit(max(1, self.degrees), 0.5 + 0.5 * confidence)) * self.standard_errors)
 
     @property
     def relative_rms(self) -> float:

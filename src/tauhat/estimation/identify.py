@@ -10,7 +10,7 @@ from tauhat.blas import single_threaded
 from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.errors import ModelError, TauhatWarning
-from tauhat.estimation.estimate import Estimate, InputLog
+from tauhat.estimation.estimate import Estimate, input_log
 from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
 from tauhat.estimation.rows import check_joints
@@ -82,19 +82,8 @@ def _estimate(
         base=base,
         processing=settings,
         estimator={"name": method.key, **asdict(method)},
-        inputs=tuple(_input(recording) for recording in recordings),
+        inputs=tuple(input_log(recording) for recording in recordings),
         **{name: getattr(solution, name) for name in kept},
-    )
-
-
-def _input(recording: Recording) -> InputLog:
-    source = recording.source
-    return InputLog(
-        name=recording.name,
-        sha256=source.sha256 if source else "",
-        rows=source.rows if source else (0, recording.n_t),
-        samples=recording.n_t,
-        seconds=recording.duration,
     )
 
 

@@ -11,8 +11,16 @@ from tauhat.arrays import FloatArray
 from tauhat.dynamics.model import Layout, TermStates, TorqueModel
 from tauhat.dynamics.motion import Motion
 from tauhat.errors import RecordingError
-from tauhat.recordings.filters import with_context
-from tauhat.recordings.processing import CHUNK, Processing, Stretch, moving_window, stretches, uniform_clock
+from tauhat.recordings.filters import HIGHEST_CUTOFF, with_context
+from tauhat.recordings.processing import (
+    CHUNK,
+    Processing,
+    Stretch,
+    clock_step,
+    moving_window,
+    stretches,
+    uniform_clock,
+)
 from tauhat.recordings.recording import Recording
 
 _LARGEST_MARGIN = 0.1  # of the recording, left out at each end
@@ -58,6 +66,8 @@ def filtered_rows(
 
 def _trusted_window(recording: Recording, processing: Processing) -> tuple[float, float]:
     begin, end = moving_window(recording)
+    if processing.cutoff >= HIGHEST_CUTOFF / clock_step(recording):
+        return begin, end
     margin = min(1.0 / processing.cutoff, _LARGEST_MARGIN * recording.duration)
     return max(begin, float(recording.t[0]) + margin), min(end, float(recording.t[-1]) - margin)
 

@@ -19,7 +19,7 @@ _WINDOW = 4.0  # [s] of one periodogram
 
 def choose_processing(recordings: Sequence[Recording], *, cutoff: float | None = None) -> Processing:
     """Return filters for these recordings: the given cut-off or the smallest that `choose_cutoff` finds in them."""
-    chosen = cutoff or min(choose_cutoff(recording) for recording in recordings)
+    chosen = min(choose_cutoff(recording) for recording in recordings) if cutoff is None else cutoff
     return Processing(cutoff=chosen, motion_cutoff=MOTION_CUTOFF * chosen)
 
 

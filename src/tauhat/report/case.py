@@ -35,7 +35,7 @@ class Case:
 
     def was_fitted(self, log: LogPrediction) -> bool:
         """Return whether a log of that name went into the fit."""
-        return log.log in {given.name for given in self.estimate.inputs}
+        return any(log.input.overlaps(given) for given in self.estimate.inputs)
 
     @property
     def unseen(self) -> tuple[LogPrediction, ...]:

@@ -1,6 +1,7 @@
 """Robot descriptions: the kinematic tree with limits and nominal inertias, and where it comes from."""
 
 from tauhat.robots.dh import robot_from_dh
+from tauhat.robots.fitting import check_joint_order, fit_to_joints
 from tauhat.robots.inertia_checks import inertia_defect
 from tauhat.robots.joint import Joint, JointKind, Limits, central_inertia, inertia_at_origin
 from tauhat.robots.kinematics import Pose, forward_kinematics, pinocchio_model
@@ -19,7 +20,9 @@ __all__ = [
     "Robot",
     "builtin_names",
     "central_inertia",
+    "check_joint_order",
     "describe_builtins",
+    "fit_to_joints",
     "forward_kinematics",
     "inertia_at_origin",
     "inertia_defect",

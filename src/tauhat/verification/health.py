@@ -13,7 +13,7 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.blas import single_threaded
 from tauhat.dynamics.base import BaseParameters
-from tauhat.dynamics.model import TorqueModel
+from tauhat.dynamics.model import TorqueModel, torque_model
 from tauhat.dynamics.rigid_body import inverse_dynamics
 from tauhat.errors import TauhatWarning
 from tauhat.estimation.delay import position_delay
@@ -24,12 +24,15 @@ from tauhat.recordings.filters import filtered, low_pass
 from tauhat.recordings.findings import Finding, Severity
 from tauhat.recordings.processing import Processing, clock_step, stretches
 from tauhat.recordings.recording import Recording
+from tauhat.robots.joint import Joint
+from tauhat.robots.robot import Robot
 
 LEAST_COHERENCE = 0.05  # of power: below minus this a joint seems to drive its own friction
 WEAK_PARAMETER = 0.5  # relative standard error above which a parameter is not seen by the motion
 _LARGEST_RATIO = 20.0  # measured over nominal torque beyond which units cannot be right
 _LEAST_CORRELATION = 0.8  # with the nominal torque, for its size to say something about units
 _WEAK_CONDITION = 100.0
+_AXIS_TERMS = ("rotor", "viscous", "coulomb", "offset")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,15 +62,51 @@ def check_recording(model: TorqueModel, recording: Recording, *, cutoff: float |
     RecordingError
         when the log does not fit the robot or has no torque.
     """
+    look = _look(model, recording, cutoff)
+    return (*_sign_findings(look), *_delay_findings(look), *_excitation_findings(look), *_unit_findings(look))
+
+
+@single_threaded
+def check_axes(recording: Recording, *, cutoff: float | None = None) -> tuple[Finding, ...]:
+    """Return what can be said without a robot: torque sign by the power balance, delay where axes move by themselves.
+
+    Every joint is taken for an axis of its own with inertia, friction and offset. That is the whole truth for a single
+    drive; on an arm it still tells the sign, and a delay only where the other joints hardly matter.
+
+    Raises
+    ------
+    RecordingError
+        when the log has no torque.
+    """
+    look = _look(torque_model(_axes(recording), _AXIS_TERMS), recording, cutoff)
+    signs = _sign_findings(look)
+    if recording.n_v > 1:  # one joint alone may be driven by gravity, which these axes do not know
+        signs = tuple(finding for finding in signs if finding.joint is None)
+    return (*signs, *_delay_findings(look))
+
+
+def _axes(recording: Recording) -> Robot:
+    """Return slides side by side, one a joint, that gravity does not load."""
+    still = np.zeros(3)
+    joints = tuple(
+        Joint(
+            name=name,
+            kind="prismatic",
+            parent=-1,
+            rotation=np.eye(3),
+            translation=still,
+            axis=np.array([1.0, 0.0, 0.0]),
+        )
+        for name in recording.joint_names
+    )
+    return Robot(name="axes", joints=joints)
+
+
+def _look(model: TorqueModel, recording: Recording, cutoff: float | None) -> _Look:
     check_joints(model, recording)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TauhatWarning)
         estimate = identify(model, [recording], cutoff=cutoff)
-    look = _look(recording, estimate)
-    return (*_sign_findings(look), *_delay_findings(look), *_excitation_findings(look), *_unit_findings(look))
-
-
-def _look(recording: Recording, estimate: Estimate) -> _Look:
     pieces = list(stretches(recording, estimate.processing))
     low = low_pass(estimate.processing.cutoff, 1.0 / clock_step(recording))
     tau = filtered(np.concatenate([piece.tau for piece in pieces], axis=1), low)

@@ -11,7 +11,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, read_only
 from tauhat.blas import single_threaded
 from tauhat.errors import ModelError
-from tauhat.estimation.estimate import Estimate
+from tauhat.estimation.estimate import Estimate, InputLog, input_log
 from tauhat.estimation.rows import filtered_rows
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
@@ -48,11 +48,13 @@ class JointError:
 class LogPrediction:
     """Measured against predicted torque on one recording.
 
+    input : which file and rows were predicted
     relative_rms, rms, r2 : all joints stacked
     t : (n,) [s]; tau, predicted, dq : (n, n_v), filtered and decimated, standstill at both ends left out
     """
 
     log: str
+    input: InputLog
     relative_rms: float
     rms: float
     r2: float
@@ -135,7 +137,7 @@ def predict_recording(estimate: Estimate, recording: Recording, *, processing: P
     if not times:
         raise ModelError("no row of the recording is left to verify on", where=recording.name)
     series = [np.ascontiguousarray(np.concatenate(part, axis=1).T) for part in (measured, predicted, speeds)]
-    return _log_prediction(estimate, recording.name, _Series(np.concatenate(times), *series))
+    return _log_prediction(estimate, input_log(recording), _Series(np.concatenate(times), *series))
 
 
 class _Series(NamedTuple):
@@ -150,12 +152,13 @@ class _Series(NamedTuple):
         return _Series(self.t, self.tau[:, joint], self.predicted[:, joint], self.dq[:, joint])
 
 
-def _log_prediction(estimate: Estimate, log: str, series: _Series) -> LogPrediction:
+def _log_prediction(estimate: Estimate, log: InputLog, series: _Series) -> LogPrediction:
     t, tau, predicted, dq = series
     error = tau - predicted
     joints = tuple(_joint_error(joint, series.of_joint(k)) for k, joint in enumerate(estimate.robot.joints))
     return LogPrediction(
-        log=log,
+        log=log.name,
+        input=log,
         relative_rms=_ratio(error, tau),
         rms=float(np.sqrt(np.mean(error**2))),
         r2=_r2(error, tau),

@@ -81,14 +81,11 @@ def compare_with_truth(estimate: Estimate, truth: Truth) -> TruthComparison:
     ----------
     truth : of a recording, best one that was not fitted
     """
-    from scipy.special import stdtrit
-
     values = estimate.base.projection @ standard_parameters(estimate.model, truth.parameters)
-    reach = float(stdtrit(max(1, estimate.degrees), 0.5 + 0.5 * CONFIDENCE))
     prediction = predict_recording(estimate, _noise_free(estimate, truth), processing=estimate.processing)
     return TruthComparison(
         values=read_only(values),
-        inside=read_only(np.abs(estimate.values - values) <= reach * estimate.standard_errors),
+        inside=read_only(np.abs(estimate.values - values) <= estimate.half_intervals(confidence=CONFIDENCE)),
         relative_rms=prediction.relative_rms,
         joints=tuple(joint.relative_rms for joint in prediction.joints),
     )

@@ -19,7 +19,7 @@ from tauhat.cli.options import (
     RobotArgument,
     RowsOption,
 )
-from tauhat.cli.output import show
+from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def run(options: Options) -> None:
     with working("identifying"):
         estimate = identify(model, recordings, estimator=estimator, cutoff=options.cutoff)
     estimate.save(options.output)
-    show(_document(estimate, options.output), lambda: _view(estimate, options.output), as_json=options.as_json)
+    show(_document(estimate, options.output), lambda: _view(estimate, options), as_json=options.as_json)
 
 
 def _document(estimate: Estimate, path: Path) -> dict[str, Any]:
@@ -73,10 +73,12 @@ def _document(estimate: Estimate, path: Path) -> dict[str, Any]:
     return {"estimate": str(path), "robot": estimate.robot.name, **{key: data[key] for key in _SHOWN}}
 
 
-def _view(estimate: Estimate, path: Path) -> Iterator[RenderableType]:
-    from rich.text import Text
-
+def _view(estimate: Estimate, options: Options) -> Iterator[RenderableType]:
     from tauhat.cli.views.estimate import estimate_view
 
     yield from estimate_view(estimate)
-    yield Text(f"Written: {path}\nNext, on a recording of another motion: tauhat verify {path} OTHER_LOG")
+    through = f" --map {options.map_file}" if options.map_file else ""
+    yield unbroken(
+        f"Written: {options.output}\n"
+        f"Next, on a recording of another motion: tauhat verify {options.output} OTHER_LOG{through}"
+    )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tauhat.cli.options import CutoffOption, EstimateArgument, JsonOption, MapOption, RowsOption
-from tauhat.cli.output import show
+from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def run(options: Options) -> None:
         "robot": estimate.robot.name,
         "logs": verification.to_dict()["logs"] if verification else [],
     }
-    show(document, lambda: [f"Written: {options.output}"], as_json=options.as_json)
+    show(document, lambda: [unbroken(f"Written: {options.output}")], as_json=options.as_json)
 
 
 def _verified(estimate: Estimate, options: Options) -> tuple[Verification, tuple[Finding, ...]]:

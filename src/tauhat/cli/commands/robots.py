@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from tauhat.cli.options import JsonOption
-from tauhat.cli.output import show
+from tauhat.cli.output import show, unbroken
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -38,4 +38,4 @@ def _view(robots: list[dict[str, Any]]) -> Iterator[RenderableType]:
     for robot in robots:
         made.add_row(robot["name"], robot["description"], str(len(robot["joints"])))
     yield made
-    yield "A robot of your own is a .urdf file or a .toml DH table: tauhat inspect my_robot.urdf"
+    yield unbroken("A robot of your own is a .urdf file or a .toml DH table:\n  tauhat inspect my_robot.urdf")

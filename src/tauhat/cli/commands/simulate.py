@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tauhat.cli.options import JsonOption, LockOption, RobotArgument, SeedOption
-from tauhat.cli.output import show
+from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
 
 if TYPE_CHECKING:
@@ -91,9 +91,7 @@ def _document(recording: Recording, options: Options, truth: Path) -> dict[str, 
 
 
 def _view(document: dict[str, Any], options: Options) -> Iterator[RenderableType]:
-    from rich.text import Text
-
-    yield Text(
+    yield unbroken(
         f"{document['samples']} samples of {len(document['joints'])} joints written: {options.output}\n"
         f"The truth behind them: {document['truth']}\n"
         f"Next: tauhat identify {options.robot} {options.output} -o estimate.json"

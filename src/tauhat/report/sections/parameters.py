@@ -12,7 +12,7 @@ from tauhat.report.case import Case, Section
 from tauhat.report.figures import parameter_plot
 from tauhat.report.formatting import value_and_half
 from tauhat.report.rendering import rendered
-from tauhat.report.uncertainty import half_intervals, relative_halves
+from tauhat.report.uncertainty import relative_halves
 
 _SURE, _UNKNOWN = 0.1, 1.0
 _SYMBOLS = {
@@ -64,7 +64,7 @@ def _groups(case: Case) -> list[tuple[str, list[Row]]]:
     """Return the rows under their joints' names, joints in order."""
     estimate = case.estimate
     standard, joints = estimate.model.parameters, estimate.robot.joint_names
-    rows = zip(estimate.summary(), half_intervals(estimate), relative_halves(estimate), strict=True)
+    rows = zip(estimate.summary(), estimate.half_intervals(), relative_halves(estimate), strict=True)
     keyed = [
         (standard[index].joint, _row(line, float(half), float(part)))
         for index, (line, half, part) in zip(estimate.base.independent, rows, strict=True)
