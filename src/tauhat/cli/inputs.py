@@ -25,6 +25,15 @@ def read_recordings(logs: Sequence[Path], *, map_file: Path | None, rows: Window
     return tuple(read_recording(log, map=map_file, rows=rows) for log in logs)
 
 
+def averaged(recordings: Sequence[Recording], *, period: float | None) -> tuple[Recording, ...]:
+    """Return the recordings, each averaged over its periods of `period` seconds where one is given."""
+    from tauhat.recordings.periods import average_periods
+
+    if period is None:
+        return tuple(recordings)
+    return tuple(average_periods(recording, period=period).recording for recording in recordings)
+
+
 def robot_of_recordings(name: str, recordings: Sequence[Recording], *, locked: Mapping[str, float] | None) -> Robot:
     """Return the robot, fitted to the joints that the recordings have."""
     from tauhat.robots.fitting import check_joint_order, fit_to_joints

@@ -115,6 +115,16 @@ LockOption: TypeAlias = Annotated[
         show_default=False,
     ),
 ]
+PeriodOption: TypeAlias = Annotated[
+    float | None,
+    typer.Option(
+        "--period",
+        metavar="SECONDS",
+        min=0.0,
+        help="Length of a repeated motion: its periods are averaged, the first is left out.",
+        show_default="not averaged",
+    ),
+]
 SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
 JsonOption: TypeAlias = Annotated[
     bool, typer.Option("--json", help="Print one JSON document on standard output and nothing else.")

@@ -6,6 +6,7 @@ from tauhat.recordings.findings import Finding, worst
 from tauhat.recordings.log import Log
 from tauhat.recordings.logmap import Coupling, LogMap, RowWindow, SignalMap, TimeMap, parse_rows
 from tauhat.recordings.mapfile import find_map, load_map, parse_map
+from tauhat.recordings.periods import PeriodAverage, average_periods
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.reading import read_chunks, read_log, read_recording
 from tauhat.recordings.recognising import map_skeleton
@@ -17,12 +18,14 @@ __all__ = [
     "Finding",
     "Log",
     "LogMap",
+    "PeriodAverage",
     "Processing",
     "Recording",
     "RowWindow",
     "SignalMap",
     "Source",
     "TimeMap",
+    "average_periods",
     "check_limits",
     "check_log",
     "choose_cutoff",

@@ -16,6 +16,7 @@ from tauhat.cli.options import (
     LogArguments,
     MapOption,
     ModelOption,
+    PeriodOption,
     RobotArgument,
     RowsOption,
 )
@@ -46,20 +47,22 @@ class Options:
     estimator: Annotated[str, typer.Option("--estimator", metavar="NAME", help="Estimator: wls or ols.")] = "wls"
     cutoff: CutoffOption = None
     rows: RowsOption = None
+    period: PeriodOption = None
     lock: LockOption = None
     as_json: JsonOption = False
 
 
 def run(options: Options) -> None:
     """Identify a robot's torque model from recordings and write it as an estimate file."""
-    from tauhat.cli.inputs import read_recordings, robot_of_recordings
+    from tauhat.cli.inputs import averaged, read_recordings, robot_of_recordings
     from tauhat.dynamics.model import torque_model
     from tauhat.estimation.identify import identify
     from tauhat.estimation.least_squares import estimator_named
 
     estimator = estimator_named(options.estimator)
     with working("reading"):
-        recordings = read_recordings(options.logs, map_file=options.map_file, rows=options.rows)
+        measured = read_recordings(options.logs, map_file=options.map_file, rows=options.rows)
+        recordings = averaged(measured, period=options.period)
         robot = robot_of_recordings(options.robot, recordings, locked=options.lock)
         model = torque_model(robot, options.model)
     with working("identifying"):
