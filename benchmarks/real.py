@@ -1,6 +1,6 @@
 """Prediction error on measured logs of eight real robots, beside the reference error of one plain baseline.
 
-    python benchmarks/real.py [--json] [--data FOLDER] [--auto-cutoff]
+    python benchmarks/real.py [--json] [--data FOLDER] [--only TEXT]
 
 Every case goes through the command line as a user would: `tauhat identify`, then `tauhat verify` on logs that were not
 fitted (unless the case says so), with one set of defaults for all robots and the reference's own cut-off. The logs are
