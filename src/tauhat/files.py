@@ -6,7 +6,7 @@ import errno
 import hashlib
 import os
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from tauhat.errors import OutputError, TauhatError
@@ -28,20 +28,54 @@ def replace_file(path: str | Path, write: Callable[[Path], object]) -> None:
     OutputError
         full disk, missing folder, no permission; nothing is left behind and an older file stays as it was.
     """
-    target = Path(path)
-    part = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.part")
+    target = check_output(path)
+    part = target.with_name(f".{target.name[:40]}.{secrets.token_hex(6)}.part")
     try:
-        target = _regular(target)
-        part = target.with_name(part.name)
         write(part)
         _flush(part)
         part.replace(target)
     except OSError as error:
-        raise OutputError(
-            "cannot be written", where=path, got=_reason(error), remedy=_REMEDIES.get(error.errno or 0, "")
-        ) from error
+        raise _unwritable(path, error) from error
     finally:
         _discard(part)
+
+
+def check_output(path: str | Path, *, inputs: Iterable[str | Path] = ()) -> Path:
+    """Return where a file would be written, links followed; to be asked before long work begins.
+
+    Parameters
+    ----------
+    inputs : files that are read for it and must not be lost
+
+    Raises
+    ------
+    OutputError
+        a folder, a device or an input in its place, no folder to hold it, no permission.
+    """
+    try:
+        place = _regular(Path(path))
+        if not place.parent.is_dir():
+            place.parent.stat()
+            raise NotADirectoryError(errno.ENOTDIR, "is not in a folder")
+        if not os.access(place.parent, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    if any(_is_same(place, name) for name in inputs):
+        raise OutputError("would overwrite a file it is made from", where=path, remedy="choose another name")
+    return place
+
+
+def _is_same(place: Path, name: str | Path) -> bool:
+    try:
+        return place.samefile(name)
+    except (OSError, ValueError):
+        return False
+
+
+def _unwritable(path: str | Path, error: OSError) -> OutputError:
+    where = str(path)[:200] or "''"
+    return OutputError("cannot be written", where=where, got=_reason(error), remedy=_REMEDIES.get(error.errno or 0, ""))
 
 
 _REMEDIES = {
@@ -51,6 +85,8 @@ _REMEDIES = {
     errno.EACCES: "choose a folder you may write to",
     errno.EROFS: "choose a folder you may write to",
     errno.ENOENT: "make the folder first",
+    errno.ENOTDIR: "choose a folder that exists",
+    errno.ENAMETOOLONG: "choose a shorter name",
     errno.EISDIR: "name a file, not a folder",
 }
 
@@ -136,7 +172,9 @@ def existing_file(path: str | Path, *, error: type[TauhatError]) -> Path:
             return place
         found = "a folder" if place.is_dir() else "not a regular file" if place.exists() else ""
     except (OSError, ValueError) as problem:
-        raise error("not a usable file name", where=repr(str(path)), got=problem) from problem
+        raise error(
+            "not a usable file name", where=repr(str(path)[:80]), got=getattr(problem, "strerror", "") or problem
+        ) from problem
     if found:
         raise error("cannot be read", where=path, expected="a file", got=found)
     raise error("no such file", where=path, remedy="check the path")

@@ -52,14 +52,14 @@ def test_check_finds_a_simulated_log_usable(tauhat: Tauhat, workshop: Workshop) 
     assert log["usable"]
     assert log["samples"] == 1001
     assert {"code", "severity", "joint", "message", "number", "advice"} == set(log["findings"][0])
-    assert {"clock", "limits", "torque-sign", "excitation"} <= {finding["code"] for finding in log["findings"]}
+    assert {"clock", "limits", "torque_sign", "excitation"} <= {finding["code"] for finding in log["findings"]}
 
 
 def test_check_without_a_robot_judges_the_numbers_alone(tauhat: Tauhat, workshop: Workshop) -> None:
     (log,) = document(tauhat, "check", workshop.log)["logs"]
     codes = {finding["code"] for finding in log["findings"]}
     assert "clock" in codes
-    assert "torque-sign" in codes  # the power balance needs no robot
+    assert "torque_sign" in codes  # the power balance needs no robot
     assert not {"limits", "excitation"} & codes
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import warnings
@@ -117,6 +118,7 @@ def test_a_log_in_another_joint_order_is_refused(tauhat: Tauhat, workshop: Works
     [
         ("bomb.urdf", ENTITY_BOMB),
         ("cut.urdf", "<robot name='r'><link name='l'"),
+        ("loop.urdf", "<robot name='r'><link name='l'/><link name='l2'/></robot>"),
         ("empty.toml", ""),
         ("robot.xml", "<mujoco/>"),
     ],
@@ -158,6 +160,54 @@ def test_an_estimate_of_another_robot_is_refused(tauhat: Tauhat, workshop: Works
     log = tmp_path / "ur5e.parquet"
     tauhat("simulate", "ur5e", "-o", log, "--seconds", 1, "--rate", 50)
     assert "does not fit" in refused(tauhat("verify", workshop.estimate, log))
+
+
+def test_an_output_that_would_replace_its_input_is_refused(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:
+    log, estimate = tmp_path / "log.csv", tmp_path / "e.json"
+    shutil.copy(workshop.text_log, log)
+    shutil.copy(workshop.estimate, estimate)
+    assert "overwrite" in refused(tauhat("identify", "two_link", log, "-o", log))
+    assert "overwrite" in refused(tauhat("report", estimate, "-o", estimate))
+    assert log.read_bytes() == workshop.text_log.read_bytes()
+    assert estimate.read_bytes() == workshop.estimate.read_bytes()
+
+
+def test_an_output_that_cannot_be_is_refused_before_the_work(tauhat: Tauhat, tmp_path: Path) -> None:
+    missing = tmp_path / "missing" / "out"
+    assert "make the folder" in refused(tauhat("identify", "two_link", tmp_path / "no.csv", "-o", missing))
+    assert "folder" in refused(tauhat("identify", "two_link", tmp_path / "no.csv", "-o", ""))
+    long = ("--seconds", 3600, "--rate", 1000)
+    assert "unknown ending" in refused(tauhat("simulate", "two_link", "-o", tmp_path / "log.docx", *long))
+    assert "absurdly long" in refused(tauhat("simulate", "two_link", "-o", tmp_path / "l.csv", *long[:3], 10_000))
+
+
+def test_a_cutoff_in_a_wrong_unit_is_refused(tauhat: Tauhat, workshop: Workshop) -> None:
+    assert "far too low" in refused(tauhat("verify", workshop.estimate, workshop.other_log, "--cutoff", "1e-9"))
+
+
+def test_check_refuses_terms_and_locks_that_mean_nothing(tauhat: Tauhat, workshop: Workshop) -> None:
+    assert "wind" in refused(tauhat("check", workshop.log, "--model", "wind", "--json"))
+    result = tauhat("check", workshop.log, "--lock", "joint_1", "--json")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert "--robot" in result.stderr
+
+
+def test_too_little_memory_is_one_line(tauhat: Tauhat, workshop: Workshop, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tauhat.recordings.reading.read_recording", raising(MemoryError()))
+    assert "not enough memory" in refused(tauhat("verify", workshop.estimate, workshop.log))
+
+
+def test_a_damaged_parquet_log_causes_one_line_and_no_panic_text(workshop: Workshop, tmp_path: Path) -> None:
+    content = bytearray(workshop.log.read_bytes())
+    log, code = tmp_path / "log.parquet", "import sys; from tauhat.cli.app import main; main()"
+    for place in range(len(content) - 40, len(content) - 8):
+        content[place] ^= 0xFF
+    log.write_bytes(content)
+    done = subprocess.run([sys.executable, "-c", code, "check", log], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
 
 
 def test_a_folder_in_place_of_the_output_is_refused(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:
@@ -240,3 +290,24 @@ def test_a_reader_that_leaves_early_causes_no_complaint(words: tuple[str, ...]) 
     done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, timeout=60, check=False)
     os.close(writing)
     assert done.stderr == b""
+    assert done.returncode == -signal.SIGPIPE
+
+
+def test_closed_streams_cause_no_complaint() -> None:
+    code = "import os\nos.close({})\nimport sys\nsys.std{} = None\nfrom tauhat.cli.app import main\nmain()"
+    for number, name in ((1, "out"), (2, "err")):
+        command = [sys.executable, "-c", code.format(number, name), "robots", "--json"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 0
+        assert done.stderr == ""
+
+
+def test_a_termination_while_writing_leaves_nothing(tmp_path: Path) -> None:
+    code = (
+        "import os, signal, sys\nfrom pathlib import Path\nfrom tauhat.cli import app\nfrom tauhat.files import "
+        "replace_file\ndef write(part):\n    part.write_text('half')\n    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "app.app = lambda: replace_file(Path(sys.argv[1]), write)\napp.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path / "out.json")], timeout=60, check=False)
+    assert done.returncode == 128 + signal.SIGTERM
+    assert list(tmp_path.iterdir()) == []

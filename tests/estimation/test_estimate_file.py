@@ -101,6 +101,13 @@ def test_a_file_of_a_newer_schema_is_refused(path):
         load_estimate(path)
 
 
+def test_a_number_of_thousands_of_digits_is_refused(tmp_path):
+    path = tmp_path / "long.json"
+    path.write_text('{"schema": ' + "9" * 5000 + "}")
+    with pytest.raises(EstimateError, match="not a readable estimate"):
+        load_estimate(path)
+
+
 def drop(*keys):
     def change(data):
         for key in keys[:-1]:
@@ -136,6 +143,10 @@ DAMAGE = {
     "a parameter kept twice": put(0, "base", "independent", 0),
     "regrouping too short": drop("base", "regrouping", 0),
     "schema version not a number": put("one", "schema_version"),
+    "schema version a truth value": put(True, "schema_version"),
+    "schema version zero": put(0, "schema_version"),
+    "an index no integer holds": put([10**30], "base", "independent"),
+    "a negative variance": put(-1.0, "covariance", 0, 0),
     "processing unknown": put(1.0, "processing", "magic"),
     "cut-off negative": put(-1.0, "processing", "cutoff"),
     "inputs not logs": put([{"name": "x"}], "inputs"),

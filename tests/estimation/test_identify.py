@@ -139,6 +139,34 @@ def test_a_joint_that_never_moves_is_told():
         identify(torque_model(planar_arm(), "viscous,coulomb"), [still], processing=SETTINGS)
 
 
+def still_second_joint(flicker: float) -> Recording:
+    """Return a log in which only the first joint moves; the second flickers by encoder counts of this size [rad]."""
+    rng = np.random.default_rng(0)
+    t = np.arange(0, 20, 0.005)
+    q, dq, ddq = smooth_motion(2, t)
+    q[:, 1], dq[:, 1], ddq[:, 1] = 0.3, 0.0, 0.0
+    tau = TRUTH.torque(q, dq, ddq) + rng.normal(size=q.shape)
+    q[:, 1] += flicker * rng.integers(-1, 2, t.size)
+    return Recording(t=t, q=q, tau=tau, joint_names=("j1", "j2"))
+
+
+def test_a_joint_that_only_flickers_is_told():
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        identify(TRUTH.model, [still_second_joint(1e-5)], processing=SETTINGS)
+    messages = [str(warning.message) for warning in warned]
+    assert any(message.startswith("no motion of j2 in any recording") for message in messages)
+    assert not any("determines only" in message for message in messages)
+
+
+def test_rounding_errors_of_a_constant_position_determine_nothing():
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter("always")
+        estimate = identify(TRUTH.model, [still_second_joint(0.0)], processing=SETTINGS)
+    assert any("determines only" in str(warning.message) for warning in warned)
+    assert np.abs(estimate.values).max() < 100
+
+
 def test_estimators_go_by_their_names():
     assert estimator_named("ols") == OrdinaryLeastSquares()
     assert estimator_named("wls") == WeightedLeastSquares()

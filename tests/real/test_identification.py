@@ -65,17 +65,17 @@ def test_check_finds_the_reversed_torque_of_the_ur3(real_data: Path, tmp_path: P
     as_logged.write_text(mapped.replace("sign = -1", "sign = 1"), encoding="utf-8")
     robot = ["--robot", real_data / "ur3/ur3_robot.urdf"] if with_robot else []
     log = real_data / "ur3/id1.mat"
-    wrong = [f for f in findings(log, "--map", as_logged, *robot) if f["code"] == "torque-sign"]
+    wrong = [f for f in findings(log, "--map", as_logged, *robot) if f["code"] == "torque_sign"]
     assert [f["severity"] for f in wrong] == ["error"]
     assert "sign = -1" in wrong[0]["advice"]
-    right = [f for f in findings(log, "--map", EXAMPLES / "ur3.toml", *robot) if f["code"] == "torque-sign"]
+    right = [f for f in findings(log, "--map", EXAMPLES / "ur3.toml", *robot) if f["code"] == "torque_sign"]
     assert [f["severity"] for f in right] == ["ok"]
 
 
 @pytest.mark.parametrize("log", ["DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"])
 def test_check_finds_the_late_position_of_the_emps(real_data: Path, log: str) -> None:
     said = findings(real_data / "emps" / log, "--map", EXAMPLES / "emps.toml", "--robot", EXAMPLES / "emps_robot.toml")
-    delay = next(finding for finding in said if finding["code"] == "torque-delay")
+    delay = next(finding for finding in said if finding["code"] == "torque_delay")
     assert delay["severity"] == "warning"
     assert delay["number"] == pytest.approx(0.9, abs=0.25)
 
@@ -94,7 +94,7 @@ def test_check_raises_no_false_alarm_about_sign_or_delay(real_data: Path, name: 
     robot, log, mapped = UNDELAYED[name]
     said = findings(real_data / log, "--map", EXAMPLES / mapped, "--robot", real_data / robot)
     doubtful = {f["code"] for f in said if f["severity"] in {"warning", "error"}}
-    assert not {"torque-delay", "torque-sign", "torque-unit"} & doubtful
+    assert not {"torque_delay", "torque_sign", "torque_scale"} & doubtful
 
 
 def test_check_says_that_one_run_of_the_kr300_is_too_weak(real_data: Path) -> None:

@@ -12,8 +12,10 @@ from tauhat.errors import RecordingError
 from tauhat.recordings.processing import (
     Processing,
     Stretch,
+    bridged,
     clock_step,
     interpolated,
+    moving_joints,
     moving_window,
     stretches,
     unwrapped,
@@ -116,6 +118,48 @@ def test_a_few_lost_samples_are_bridged(seconds):
     assert whole(with_gap(seconds)).t[-1] == pytest.approx(0.002 * 998 + seconds, abs=0.002)
 
 
+def test_a_gap_is_bridged_without_bursts_of_acceleration():
+    t = np.arange(2000) * 0.002
+    kept = np.ones(t.size, dtype=bool)
+    kept[1000:1040] = False
+    _, dq, ddq = smooth_motion(2, t)
+    stretch = whole(moving(t[kept]))
+    inside = slice(200, -200)
+    assert np.allclose(stretch.t, t, atol=1e-9)
+    assert np.allclose(stretch.dq.T[inside], dq[inside], atol=0.01 * np.abs(dq).max())
+    assert np.allclose(stretch.ddq.T[inside], ddq[inside], atol=0.1 * np.abs(ddq).max())
+
+
+@given(lost=st.integers(1, 20), start=st.integers(0, 60), a=st.floats(-5, 5), b=st.floats(-5, 5))
+def test_lost_samples_of_a_parabola_are_put_back_exactly(lost, start, a, b):
+    t = np.arange(100) * 0.01
+    kept = np.ones(t.size, dtype=bool)
+    kept[1 + start + 5 : 1 + start + 5 + lost] = False
+    line = (a + b * t + 3.0 * t**2)[:, None]
+    times, signals = bridged(t[kept], line[kept], step=0.01)
+    assert np.allclose(times, t, rtol=0, atol=1e-12)
+    assert np.allclose(signals, line, rtol=0, atol=1e-9)
+
+
+def test_a_gap_right_at_the_begin_is_bridged_straight():
+    t = np.array([0.0, *np.arange(3, 20)])
+    times, signals = bridged(t, t[:, None], step=1.0)
+    assert np.allclose(times, np.arange(20.0))
+    assert np.allclose(signals[:, 0], np.arange(20.0))
+
+
+def test_a_whole_clock_is_left_alone():
+    t = np.arange(50) * 0.01
+    assert bridged(t, t[:, None], step=0.01)[0] is t
+
+
+def test_a_joint_moves_when_it_does_more_than_flicker():
+    t = np.arange(4000) * 0.002
+    flicker = np.random.default_rng(0).integers(-2, 3, t.size)
+    q = 1e-4 * np.column_stack([np.round(100 * np.sin(t)), flicker, 0 * t])
+    assert moving_joints(Recording(t=t, q=q)).tolist() == [True, False, False]
+
+
 def test_a_slow_log_has_no_gap_where_its_steps_are_long():
     assert whole(moving(np.arange(100) * 0.5), Processing(cutoff=0.3, motion_cutoff=0.8)).t.size == 100
 
@@ -147,6 +191,13 @@ def test_standstill_at_both_ends_is_left_out():
 def test_a_recording_without_motion_is_kept_whole():
     t = 1.0 + np.arange(500) * 0.01
     assert moving_window(moving(t, q=np.ones((500, 2)))) == (t[0], t[-1])
+
+
+def test_standstill_is_left_out_though_a_joint_flickers_all_the_time():
+    t = np.arange(6000) * 0.002
+    q = np.column_stack([np.sin(2 * np.clip(t - 4.0, 0.0, 4.0)), np.zeros(t.size)])
+    q[::97, 1] = 1e-4
+    assert moving_window(Recording(t=t, q=q)) == pytest.approx((4.0, 8.0), abs=0.06)
 
 
 def test_a_recording_shorter_than_the_look_ahead_is_kept_whole():

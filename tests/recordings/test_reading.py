@@ -174,6 +174,7 @@ def damaged(number: int) -> str:
         (b"\x89HDF\r\n\x1a\n" + bytes(600), "MATLAB 7.3"),
         (b"MATLAB 7.3 MAT-file" + bytes(600), "MATLAB 7.3"),
         (bytes(range(256)) * 4, "neither text nor a known format"),
+        (text(table()).encode("utf-16"), "UTF-16 text; expected UTF-8"),
         (b"1" * 2**20, "absurdly long line"),
         (b"PAR1" + bytes(200), "damaged Parquet file"),
         (b"PK\x03\x04" + bytes(200), "damaged array file"),

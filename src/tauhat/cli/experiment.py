@@ -12,6 +12,7 @@ import numpy as np
 
 from tauhat.dynamics.base import base_parameters
 from tauhat.dynamics.model import torque_model
+from tauhat.errors import SimulationError
 from tauhat.excitation.fourier import random_fourier
 from tauhat.files import write_text
 from tauhat.recordings.writing import write_recording
@@ -22,6 +23,7 @@ from tauhat.simulation.sensors import SensorErrors
 from tauhat.verification.truth import standard_parameters
 
 _SLOWEST_CONTROL = 2000.0  # [Hz]
+_MOST_SAMPLES = 5_000_000  # of one log: a few gigabytes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +42,13 @@ class Plan:
     harmonics: int = 5
     noise: float = 0.02
     quantisation: float = 2e-5
+
+    def __post_init__(self) -> None:
+        if self.seconds * self.rate > _MOST_SAMPLES:
+            raise SimulationError(
+                "absurdly long log", expected=f"at most {_MOST_SAMPLES} samples",
+                got=f"{self.seconds * self.rate:.0f}", remedy="choose a shorter motion or a lower rate",
+            )  # fmt: skip
 
     @property
     def settings(self) -> ExperimentSettings:

@@ -67,11 +67,19 @@ RobotArgument: TypeAlias = Annotated[
     ),
 ]
 EstimateArgument: TypeAlias = Annotated[
-    Path, typer.Argument(metavar="ESTIMATE", help="Estimate file written by `tauhat identify`.", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="ESTIMATE", help="Estimate file written by `tauhat identify`.", show_default=False, readable=False
+    ),
 ]
 LogArguments: TypeAlias = Annotated[
     list[Path],
-    typer.Argument(metavar="LOG...", help="Recordings: CSV (also .gz), Parquet, NPZ or MAT.", show_default=False),
+    typer.Argument(
+        metavar="LOG",
+        help="Recordings: CSV (also .gz), Parquet, NPZ or MAT.",
+        show_default=False,
+        readable=False,
+    ),
 ]
 MapOption: TypeAlias = Annotated[
     Path | None,
@@ -80,6 +88,7 @@ MapOption: TypeAlias = Annotated[
         metavar="MAP.toml",
         help="What the columns mean; by default the map beside each log.",
         show_default=False,
+        readable=False,
     ),
 ]
 RowsOption: TypeAlias = Annotated[
@@ -111,7 +120,7 @@ LockOption: TypeAlias = Annotated[
         "--lock",
         metavar="NAME[=VALUE],...",
         parser=locks,
-        help="Freeze joints of the robot, e.g. a gripper's, at VALUE or 0 [rad or m].",
+        help="Freeze joints of the robot, e.g. a gripper's, at VALUE or 0 (rad or m).",
         show_default=False,
     ),
 ]

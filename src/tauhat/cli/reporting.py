@@ -42,6 +42,9 @@ def one_line_reports() -> Iterator[None]:
         except TauhatError as error:
             say("error", str(error))
             raise typer.Exit(FAILED) from error
+        except MemoryError as error:
+            say("error", "not enough memory; take fewer rows with --rows, or a shorter motion")
+            raise typer.Exit(FAILED) from error
         except BrokenPipeError:
             raise  # whoever reads our output has enough; Typer leaves quietly
         except OSError as error:
@@ -75,6 +78,26 @@ def working(what: str) -> Iterator[None]:
         return
     with console.status(what):
         yield
+
+
+@contextmanager
+def searching(what: str, generations: int) -> Iterator[Callable[[int, float], None] | None]:
+    """Show on a terminal how far a genetic search is and its best criterion; yields what to call per generation."""
+    console = error_console()
+    if not console.is_terminal:
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("best {task.fields[best]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(f"searching {what}", total=generations, best="-")
+        yield lambda generation, best: bar.update(task, completed=generation, best=f"{best:.3f}")
 
 
 def _each_once() -> Callable[..., None]:

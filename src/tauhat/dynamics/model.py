@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray
-from tauhat.dynamics.motion import Motion
+from tauhat.dynamics.motion import Motion, MotionGradient, no_gradient
 from tauhat.dynamics.terms import Coulomb, Inertia, Offset, Parameter, RotorInertia, Term, Viscous
 from tauhat.errors import ModelError
 from tauhat.robots.robot import Robot
@@ -107,6 +107,23 @@ class TorqueModel:
                 out[target] = values[picked]
         return out, tuple(after)
 
+    def pull(self, motion: Motion, layout: Layout, bars: FloatArray) -> MotionGradient:
+        """Return the gradient with respect to the motion of a scalar with sensitivities `bars` (n_rows, n_t).
+
+        Raises
+        ------
+        ModelError
+            when a term's columns have no gradient.
+        """
+        gradient = no_gradient(motion)
+        for term, sources in zip(self.terms, layout.sources, strict=True):
+            supports = term.support(self.robot)
+            parts = tuple(np.zeros((support.size, motion.n_t)) for support in supports)
+            for part, (picked, target) in zip(parts, sources, strict=True):
+                part[picked] = bars[target]
+            term.pull(self.robot, motion, parts, gradient)
+        return gradient
+
     def with_term(self, term: Term) -> TorqueModel:
         """Return the model with the term of the same kind replaced."""
         return replace(self, terms=tuple(term if other.key == term.key else other for other in self.terms))
@@ -154,9 +171,20 @@ def torque_model(robot: Robot, terms: str | Iterable[str] = PLAIN_TERMS) -> Torq
     ModelError
         when a name is unknown or given twice.
     """
+    return TorqueModel(robot=robot, terms=tuple(TERMS[key]() for key in known_terms(terms)))
+
+
+def known_terms(terms: str | Iterable[str]) -> tuple[str, ...]:
+    """Return the names in a list of terms.
+
+    Raises
+    ------
+    ModelError
+        when one is unknown.
+    """
     names = terms.split(",") if isinstance(terms, str) else list(terms)
-    keys = [name.strip() for name in names]
+    keys = tuple(name.strip() for name in names)
     unknown = [key for key in keys if key not in TERMS]
     if unknown:
-        raise ModelError("unknown term", expected=", ".join(TERMS), got=", ".join(unknown))
-    return TorqueModel(robot=robot, terms=tuple(TERMS[key]() for key in keys))
+        raise ModelError("unknown term", expected=", ".join(TERMS), got=", ".join(key or "''" for key in unknown))
+    return keys

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,19 @@ class Motion:
         return Motion(
             q=self.q[:, start:stop], dq=self.dq[:, start:stop], ddq=self.ddq[:, start:stop], step=self.step, load=load
         )
+
+
+class MotionGradient(NamedTuple):
+    """Gradient of a scalar with respect to a motion, (n_v, n_t) each."""
+
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+
+
+def no_gradient(motion: Motion) -> MotionGradient:
+    """Return a gradient of zeros, to add to."""
+    return MotionGradient(*(np.zeros_like(motion.q) for _ in range(3)))
 
 
 def motion_from_rows(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Motion:

@@ -39,17 +39,18 @@ def regressor_kernel(parents, prismatic, abc, place, axis, gravity, q, dq, ddq, 
             while j >= 0:
                 inner, outer = 384 * (n_v * p + j), 384 * (n_v * i + j)
                 seen = axes[outer : outer + 384]
-                _carry_axis(axes[inner : inner + 384], seen, x)
+                carry_axis(axes[inner : inner + 384], seen, x)
                 _write_columns(i, j, start, size, seen, x, out)
                 j = parents[j]
             own = 384 * (n_v * i + i)
             seen = axes[own : own + 384]
-            _own_axis(axis[i, 0], axis[i, 1], axis[i, 2], prismatic[i], seen)
+            own_axis(axis[i, 0], axis[i, 1], axis[i, 2], prismatic[i], seen)
             _write_columns(i, i, start, size, seen, x, out)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _carry_axis(inner, outer, x):  # type: ignore[no-untyped-def]
+def carry_axis(inner, outer, x):  # type: ignore[no-untyped-def]
+    """Turn z, u of one joint from the parent's frame into the link's."""
     for s in range(64):
         z0, z1, z2 = inner[s], inner[64 + s], inner[64 * 2 + s]
         p0, p1, p2 = x[64 * 9 + s], x[64 * 10 + s], x[64 * 11 + s]
@@ -65,7 +66,8 @@ def _carry_axis(inner, outer, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _own_axis(e0, e1, e2, prismatic, own):  # type: ignore[no-untyped-def]
+def own_axis(e0, e1, e2, prismatic, own):  # type: ignore[no-untyped-def]
+    """Fill z, u of a link's own joint."""
     turn = 0.0 if prismatic else 1.0
     slide = 1.0 - turn
     for s in range(64):

@@ -14,7 +14,8 @@ from typing import ClassVar
 import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray
-from tauhat.dynamics.motion import Motion
+from tauhat.dynamics.adjoint_kernel import adjoint_kernel
+from tauhat.dynamics.motion import Motion, MotionGradient
 from tauhat.dynamics.rigid_body import inertial_columns
 from tauhat.dynamics.tree import kernel_tree
 from tauhat.errors import ModelError
@@ -72,6 +73,22 @@ class Term(ABC):
         `state` is None at the start of a recording and for pointwise terms.
         """
 
+    def pull(self, robot: Robot, motion: Motion, bars: tuple[FloatArray, ...], gradient: MotionGradient) -> None:
+        """Add to `gradient` what the sensitivities `bars` of the term's columns say about the motion.
+
+        Parameters
+        ----------
+        bars : for each joint df/d(columns of its support), (n_support, n_t)
+
+        Raises
+        ------
+        ModelError
+            when the term's columns have no gradient.
+        """
+        raise ModelError(
+            f"the columns of term {self.key} have no gradient", remedy="leave it out of the motion's design"
+        )
+
     def candidates(self, top_speeds: FloatArray) -> tuple[Term, ...]:
         """Return the forms of the term among which the fit on the recordings decides; most terms have one.
 
@@ -116,6 +133,13 @@ class Inertia(Term):
         whole = inertial_columns(kernel_tree(robot), motion)
         support = self.support(robot)
         return tuple(_rows(whole[:, joint], support[joint]) for joint in range(robot.n_v)), state
+
+    def pull(self, robot: Robot, motion: Motion, bars: tuple[FloatArray, ...], gradient: MotionGradient) -> None:
+        """Add the adjoint of the regressor."""
+        whole = np.zeros((10 * robot.n_v, robot.n_v, motion.n_t))
+        for joint, (rows, bar) in enumerate(zip(self.support(robot), bars, strict=True)):
+            whole[rows, joint] = bar
+        adjoint_kernel(*kernel_tree(robot).geometry, motion.q, motion.dq, motion.ddq, whole, *gradient)
 
 
 def _rows(columns: FloatArray, rows: IntArray) -> FloatArray:
@@ -170,6 +194,10 @@ class RotorInertia(JointTerm):
         """Return ddq; pointwise."""
         return _own(motion.ddq), state
 
+    def pull(self, robot: Robot, motion: Motion, bars: tuple[FloatArray, ...], gradient: MotionGradient) -> None:
+        """Add to the gradient of ddq."""
+        gradient.ddq[:] += np.concatenate(bars)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Viscous(JointTerm):
@@ -188,6 +216,10 @@ class Viscous(JointTerm):
     ) -> tuple[tuple[FloatArray, ...], FloatArray | None]:
         """Return dq; pointwise."""
         return _own(motion.dq), state
+
+    def pull(self, robot: Robot, motion: Motion, bars: tuple[FloatArray, ...], gradient: MotionGradient) -> None:
+        """Add to the gradient of dq."""
+        gradient.dq[:] += np.concatenate(bars)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -233,6 +265,12 @@ class Coulomb(JointTerm):
             raise ModelError("one width a joint is needed", expected=robot.n_v, got=len(self.widths))
         return _own(np.tanh(motion.dq / np.array(self.widths)[:, None])), state
 
+    def pull(self, robot: Robot, motion: Motion, bars: tuple[FloatArray, ...], gradient: MotionGradient) -> None:
+        """Add to the gradient of dq; the plain sign has none."""
+        if self.widths:
+            widths = np.array(self.widths)[:, None]
+            gradient.dq[:] += np.concatenate(bars) / (widths * np.cosh(np.clip(motion.dq / widths, -300.0, 300.0)) ** 2)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Offset(JointTerm):
@@ -250,3 +288,6 @@ class Offset(JointTerm):
     ) -> tuple[tuple[FloatArray, ...], FloatArray | None]:
         """Return ones; pointwise."""
         return _own(np.ones_like(motion.q)), state
+
+    def pull(self, robot: Robot, motion: Motion, bars: tuple[FloatArray, ...], gradient: MotionGradient) -> None:
+        """Add nothing: a constant does not depend on the motion."""

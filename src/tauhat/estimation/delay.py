@@ -16,6 +16,7 @@ from tauhat.arrays import FloatArray
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.terms import Coulomb
+from tauhat.errors import ModelError
 from tauhat.estimation.evidence import evidence_from_rows
 from tauhat.estimation.rows import Rows, filtered_rows
 from tauhat.estimation.solution import joint_residuals, joint_torques, solve
@@ -91,6 +92,8 @@ def band_residual(
     """Return the relative residual of a fit between `lower` [Hz] and the processing's cut-off, all joints alike."""
     layout = model.layout(base.independent)
     pieces = list(filtered_rows(model, layout, recording, processing))
+    if not pieces:
+        raise ModelError("no row of the recording is left to identify from", where=recording.name)
     whole = Rows(*(np.concatenate(parts, axis=-1) for parts in zip(*pieces, strict=True)))
     high = high_pass(lower, (whole.t.size - 1) / float(whole.t[-1] - whole.t[0]))
     detail = whole._replace(columns=filtered(whole.columns, high), tau=filtered(whole.tau, high))

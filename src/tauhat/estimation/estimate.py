@@ -108,6 +108,8 @@ class Estimate:
         }
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape, where="estimate"))
+        if (np.diag(self.covariance) < 0.0).any():
+            raise EstimateError("a variance is negative", where="estimate")
 
     @property
     def robot(self) -> Robot:
@@ -239,7 +241,7 @@ def load_estimate(path: str | Path) -> Estimate:
     text = read_text(Path(path), error=EstimateError, largest=_LARGEST_FILE)
     try:
         data = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise EstimateError(
             "not a readable estimate",
             where=path,
@@ -249,8 +251,8 @@ def load_estimate(path: str | Path) -> Estimate:
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         raise EstimateError("not an estimate file", where=path, expected=f'"schema": "{SCHEMA}"')
     written = data.get("schema_version")
-    if not isinstance(written, int):
-        raise EstimateError("the estimate is damaged", where=path, expected="schema_version, a number", got=written)
+    if isinstance(written, bool) or not isinstance(written, int) or written < 1:
+        raise EstimateError("the estimate is damaged", where=path, expected="schema_version, 1 or more", got=written)
     if written > SCHEMA_VERSION:
         raise EstimateError(
             "written by a newer version",
@@ -263,7 +265,7 @@ def load_estimate(path: str | Path) -> Estimate:
         return estimate_from_dict(data)
     except TauhatError as error:
         raise EstimateError("the estimate is damaged", where=path, got=error) from error
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
         raise EstimateError("the estimate is damaged", where=path, got=f"{type(error).__name__} {error}") from error
 
 

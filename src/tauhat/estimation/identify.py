@@ -6,6 +6,8 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 
+import numpy as np
+
 from tauhat.blas import single_threaded
 from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
@@ -16,7 +18,7 @@ from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
 from tauhat.estimation.rows import check_joints
 from tauhat.estimation.solution import Solution
 from tauhat.estimation.tuning import tuned
-from tauhat.recordings.processing import Processing
+from tauhat.recordings.processing import Processing, moving_joints
 from tauhat.recordings.recording import Recording
 
 DOUBTFUL_CONDITION = 300.0  # scaled condition number above which a motion does not support its model
@@ -50,7 +52,7 @@ def identify(
     Warns
     -----
     TauhatWarning
-        when the motion is too weak for the model, or friction comes out negative on most joints.
+        when a joint stands still, the motion is too weak for the model, or friction comes out negative on most joints.
     """
     if not recordings:
         raise ModelError("no recording to identify from")
@@ -61,6 +63,7 @@ def identify(
     base = base_parameters(settled)
     evidence = collect_all(settled, base, recordings, settings)
     solution = method.fit(evidence)
+    _warn_of_still_joints(recordings)
     estimate = _estimate(settled, base, solution, settings=settings, method=method, recordings=recordings)
     warn_of_weak_motion(evidence, solution, estimate)
     _warn_of_negative_friction(estimate)
@@ -102,6 +105,19 @@ def warn_of_weak_motion(evidence: Evidence, solution: Solution, estimate: Estima
             f"scaled condition number {solution.condition:.3g} (good below 100, doubtful above "
             f"{DOUBTFUL_CONDITION:g}); least certain: {', '.join(row.name for row in weakest)}; the model fits this "
             "motion and may be far off on another: record a richer one or give more recordings",
+            TauhatWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_of_still_joints(recordings: Sequence[Recording]) -> None:
+    """Warn of joints that only flicker: columns of noise look well conditioned and make parameters of nothing."""
+    moves = np.any([moving_joints(recording) for recording in recordings], axis=0)
+    if not moves.all():
+        still = [name for name, moved in zip(recordings[0].joint_names, moves, strict=True) if not moved]
+        warnings.warn(
+            f"no motion of {', '.join(still)} in any recording: friction and rotor inertia there are fitted to encoder "
+            "noise and predict nothing; record a motion that moves every joint, or lock those that stand still",
             TauhatWarning,
             stacklevel=3,
         )

@@ -24,6 +24,7 @@ from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Block, Evidence
 
 RANK = 1e-10  # singular values below this part of the largest are taken as zero
+_SILENT = 1e-9  # a column below this part of the largest is rounding of a constant position, not motion
 _WELL = 1e-8  # smallest over largest pivot with which the triangle is solved as it is
 MOST_GROUPS = 16  # of blocks of time in the jackknife: fewer and longer ones outlast the residuals' correlation
 _LEAST_FREE = 1e-3  # smallest eigenvalue of E - B'B that is trusted: a parameter that one block alone decides
@@ -97,7 +98,10 @@ def rank_and_condition(evidence: Evidence, weights: FloatArray) -> tuple[int, fl
 
 
 def _triangle(evidence: Evidence, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the factor [R z] of the whole weighted problem with columns of unit norm, and the columns' norms."""
+    """Return the factor [R z] of the whole weighted problem with columns of unit norm, and the columns' norms.
+
+    Columns of mere rounding are zero there and their norm infinite: their parameters come out as zero, without rank.
+    """
     matrix, rhs = _stacked(evidence, evidence.total, weights)
     if not rhs.any():
         raise ModelError("the torque is zero throughout", remedy="name the right torque columns in the map")
@@ -106,8 +110,9 @@ def _triangle(evidence: Evidence, weights: FloatArray) -> tuple[FloatArray, Floa
         silent = int((scale <= 0).sum())
         raise ModelError(
             f"{silent} of {evidence.n_b} base parameters never load a joint in these recordings",
-            remedy="record a motion that moves every joint",
+            remedy="record a motion that moves every joint, all together, or lock those that stand still",
         )
+    scale = np.where(scale > _SILENT * scale.max(), scale, np.inf)
     triangle = np.asarray(np.linalg.qr(np.column_stack([matrix / scale, rhs]), mode="r"))
     return triangle[: evidence.n_b], np.asarray(scale)
 

@@ -1,17 +1,51 @@
-"""Motions that identify: Fourier series from rest to rest inside a robot's limits."""
+"""Motions that identify: Fourier series, criteria of information, genetic and gradient design."""
 
-from tauhat.excitation.fourier import Envelope, FourierSeries, fourier_basis, random_fourier, rest_basis
+from tauhat.excitation.criteria import (
+    CRITERIA,
+    AOptimal,
+    ConditionNumber,
+    Criterion,
+    DOptimal,
+    EOptimal,
+    Mixed,
+    criterion_named,
+)
+from tauhat.excitation.design import METHODS, Design, DesignSettings, Method, design, limit_margins, method_named
+from tauhat.excitation.fourier import FourierSeries, fourier_basis, random_fourier, rest_basis
+from tauhat.excitation.genetic import GeneticSettings
+from tauhat.excitation.information import Information, information
 from tauhat.excitation.limits import MotionLimits, motion_limits
+from tauhat.excitation.space import FourierSpace, SampledSpace, random_points
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
 
 __all__ = [
-    "Envelope",
+    "CRITERIA",
+    "METHODS",
+    "AOptimal",
+    "ConditionNumber",
+    "Criterion",
+    "DOptimal",
+    "Design",
+    "DesignSettings",
+    "EOptimal",
     "FourierSeries",
+    "FourierSpace",
+    "GeneticSettings",
+    "Information",
+    "Method",
+    "Mixed",
     "MotionLimits",
     "MotionSamples",
+    "SampledSpace",
     "Trajectory",
+    "criterion_named",
+    "design",
     "fourier_basis",
+    "information",
+    "limit_margins",
+    "method_named",
     "motion_limits",
     "random_fourier",
+    "random_points",
     "rest_basis",
 ]

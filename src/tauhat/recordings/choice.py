@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.recordings.processing import Processing, clock_step, interpolated, unwrapped
+from tauhat.recordings.processing import Processing, clock_step, interpolated, moving_joints, unwrapped
 from tauhat.recordings.recording import Recording
 
 MOTION_CUTOFF = 3.0  # cut-off of the position over that of torque and columns
@@ -28,7 +28,7 @@ def choose_cutoff(recording: Recording) -> float:
 
     Motion ends where the position's spectrum meets its noise floor (the median above 0.6 of the highest frequency).
     Where the log is so clean that this is far above anything the robot does, twenty times the frequency that holds
-    99.9 % of the velocity's power is enough for the harmonics that friction makes.
+    99.9 % of the velocity's power is enough for the harmonics that friction makes. Joints that stand still say nothing.
     """
     from scipy.signal import welch
 
@@ -37,7 +37,9 @@ def choose_cutoff(recording: Recording) -> float:
     q = interpolated(recording.t, unwrapped(recording.q), clock)
     size = min(clock.size, round(_WINDOW / step))
     frequency, density = welch(q, fs=1.0 / step, nperseg=size, detrend="linear", axis=1)
-    moving = density[:, 1:].sum(axis=1) > 0
+    loud = density[:, 1:].sum(axis=1) > 0
+    moving = loud & moving_joints(recording)
+    moving = moving if moving.any() else loud
     if not moving.any():
         return float(frequency[-1])
     limits = [_floor_frequency(frequency, row) for row in density[moving]]

@@ -22,6 +22,7 @@ ORDER = 4  # of the Butterworth filter, run in both directions
 TAIL = 1e-4  # a low-pass kernel is cut where its envelope has fallen below this part of its peak
 DERIVATIVE_TAIL = 1e-6  # derivatives need their tails: ddq is 0.7 % off at a quarter of the cut-off with 1e-4
 _SPAN = 8  # outputs made by one matrix product
+LONGEST_KERNEL = 2**20  # [samples] on each side; a cut-off that needs more is an error of its unit
 HIGHEST_CUTOFF = 0.45  # of the rate; above it nothing is filtered
 
 
@@ -125,6 +126,11 @@ def _impulse_response(cutoff: float, rate: float, derivative: int, tail: float) 
     if not 0.0 < cutoff < np.inf:
         raise RecordingError("the cut-off frequency must be positive", got=f"{cutoff} Hz")
     slowest = np.abs(butter(ORDER, cutoff, fs=rate, output="zpk")[1]).max()
+    if slowest >= 1.0 or np.log(tail) / np.log(slowest) > LONGEST_KERNEL:
+        raise RecordingError(
+            "the cut-off frequency is far too low", got=f"{cutoff:g} Hz at {rate:g} samples per second",
+            remedy="give it in Hz, above the frequencies of the motion",
+        )  # fmt: skip
     half = int(np.ceil(np.log(tail) / np.log(slowest))) + 1
     size = 1 << int(np.ceil(np.log2(8 * half)))
     sections = butter(ORDER, cutoff, fs=rate, output="sos")

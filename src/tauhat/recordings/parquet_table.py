@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,14 +28,20 @@ class ParquetTable(Table):
         import polars as pl
 
         try:
-            self._lazy = pl.scan_parquet(path, glob=False)
-            self._schema = self._lazy.collect_schema()
-            self._metadata = pl.read_parquet_metadata(path)
-            self._rows = int(self._lazy.select(pl.len()).collect().item())
+            with _silenced():
+                self._open(path)
         except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, UnicodeDecodeError) as error:
             raise _damaged(path, error) from error
         names = tuple(self._schema.names())
         super().__init__(path, names, {name: (index,) for index, name in enumerate(names)})
+
+    def _open(self, path: Path) -> None:
+        import polars as pl
+
+        self._lazy = pl.scan_parquet(path, glob=False)
+        self._schema = self._lazy.collect_schema()
+        self._metadata = pl.read_parquet_metadata(path)
+        self._rows = int(self._lazy.select(pl.len()).collect().item())
 
     @property
     def width(self) -> int:
@@ -49,7 +57,8 @@ class ParquetTable(Table):
         for first in range(start, end, _SLICE):
             selected = self._lazy.select([pl.col(name).cast(pl.Float64) for name in dict.fromkeys(wanted)])
             try:
-                frame = selected.slice(first, min(_SLICE, end - first)).collect()
+                with _silenced():
+                    frame = selected.slice(first, min(_SLICE, end - first)).collect()
             except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError) as error:
                 raise _damaged(self.path, error) from error
             if frame.height != min(_SLICE, end - first):
@@ -70,6 +79,24 @@ class ParquetTable(Table):
         if not dtype.is_numeric():
             raise RecordingError("not a column of numbers", where=f"{self.path}, column {name}", got=dtype)
         return name
+
+
+@contextmanager
+def _silenced() -> Iterator[None]:
+    """Keep off standard error what Polars' native threads print there when a damaged file makes them panic."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # there is no standard error
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(nowhere)
+        os.close(kept)
 
 
 def _damaged(path: Path, error: object) -> RecordingError:

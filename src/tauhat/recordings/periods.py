@@ -60,7 +60,7 @@ def average_periods(recording: Recording, *, period: float, skip: int = 1) -> Pe
     t = np.asarray(begin + step * np.arange(whole * size), dtype=np.float64)
     folded = {name: _folded(recording, name, t, whole) for name in _SIGNALS if getattr(recording, name) is not None}
     means = {name: parts.mean(axis=0) for name, parts in folded.items()}
-    averaged = replace(recording, t=t[:size], **{**dict.fromkeys(_SIGNALS), **means})  # type: ignore[arg-type]
+    averaged = replace(recording, t=t[:size], **{**dict.fromkeys(_SIGNALS), **means})
     still = np.zeros((2, size, recording.n_v))
     return PeriodAverage(
         recording=averaged,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ _STEMS = {
     "torque": ("tau_", "tau"),
     "temperature": ("temperature_", "temperature"),
 }
+_TORQUE_LIKE = re.compile("tau|torq|effort|cur|amp|moment|force")
+_SPEED_LIKE = re.compile("dq|qd|vel|speed|omega")
 _WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
@@ -53,9 +56,9 @@ def map_skeleton(path: str | Path) -> str:
 
 def skeleton(table: Table) -> str:
     """Return the text of a map to start from for an opened file."""
-    clock, *others = _guesses(table)
+    clock, others = _guesses(table)
     lines = ["[time]", f"column = {clock}", 'unit = "s"  # or ms, us, ns']
-    for kind, columns in zip(("position", "velocity", "torque"), others, strict=False):
+    for kind, columns in others.items():
         unit = {"torque": '"Nm"  # or A, V, count with gain = [...]'}.get(
             kind, '"rad"  # or deg, count with scale = [...]'
         )
@@ -82,17 +85,30 @@ def _numbered(table: Table, stem: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _guesses(table: Table) -> list[str]:
-    """Return TOML values for the clock, then for the position, velocity and torque columns."""
+def _guesses(table: Table) -> tuple[str, dict[str, str]]:
+    """Return TOML values for the clock, and for the position, velocity and torque columns as far as there are any."""
+    kinds = ("position", "velocity", "torque")
     if not table.groups:
         joints = max(1, (table.width - 1) // 3)
         spans = [(1 + k * joints, (k + 1) * joints) for k in range(3) if (k + 1) * joints < table.width]
-        return ["0", *(f'"{{{first}..{last}}}"' for first, last in spans or [(0, 0)])]
+        texts = [f'"{{{first}..{last}}}"' for first, last in spans or [(0, 0)]]
+        return "0", dict(zip(kinds, texts, strict=False))
     runs = compact_names(tuple(name for name in table.groups if not name.endswith("]")))
     quoted = [f'"{run}"' for run in runs]
     wide = [text for text, run in zip(quoted, runs, strict=True) if "{" in run or len(table.groups.get(run, ())) > 1]
     clock = next((text for text, run in zip(quoted, runs, strict=True) if run.lower().startswith("t")), quoted[0])
-    return [clock, *(wide or [text for text in quoted if text != clock] or quoted)[:3]]
+    return clock, _placed(wide or [text for text in quoted if text != clock] or quoted)
+
+
+def _placed(found: list[str]) -> dict[str, str]:
+    """Return which run of columns is what, by name where the names tell, else in their order."""
+    torque = next((text for text in found if _TORQUE_LIKE.search(text.lower())), None)
+    speed = next((text for text in found if text != torque and _SPEED_LIKE.search(text.lower())), None)
+    if torque is None and speed is None:
+        return dict(zip(("position", "velocity", "torque"), found, strict=False))
+    place = next((text for text in found if text not in {torque, speed}), found[0])
+    named = {"position": place, "velocity": speed, "torque": torque}
+    return {kind: text for kind, text in named.items() if text is not None}
 
 
 def _map_name(path: Path) -> str:

@@ -24,6 +24,7 @@ from tauhat.recordings.table import Table
 
 GZIP_MAGIC = b"\x1f\x8b"
 _BOM = b"\xef\xbb\xbf"
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _HEAD = 2**18  # [bytes] looked at to find out the layout
 _BLOCK = 2**23  # [bytes] parsed at once
 _COMMENTS = (b"#", b"%", b"//")
@@ -164,6 +165,8 @@ def _head_lines(path: Path) -> list[bytes]:
         head = file.read(_HEAD)
     if not head:
         raise RecordingError("empty file", where=path)
+    if head.startswith(_UTF_16):
+        raise RecordingError("UTF-16 text", where=path, expected="UTF-8", remedy="save the log again as UTF-8")
     if b"\0" in head:
         raise RecordingError("neither text nor a known format", where=path, expected="CSV, Parquet, NPZ or MAT")
     lines = head.removeprefix(_BOM).replace(b"\r\n", b"\n").split(b"\n")

@@ -17,6 +17,7 @@ from tauhat.recordings.recording import Recording
 if TYPE_CHECKING:
     import polars as pl
 
+_ENDINGS = (".parquet", ".csv", ".csv.gz")
 _WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 _ROWS = 2**17  # per row group, so that readers can take a Parquet log in slices
 _QUICK = 3  # gzip level: logs of noise gain little from higher ones
@@ -58,16 +59,28 @@ def write_columns(
         ".csv": _write_csv,
         ".csv.gz": _write_gzip,
     }
-    name = Path(path).name.lower()
-    write = next((writer for ending, writer in writers.items() if name.endswith(ending)), None)
-    if write is None:
-        raise OutputError("unknown ending", where=path, expected=", ".join(writers))
+    write = writers[log_ending(path)]
     frame = pl.DataFrame(dict(columns))
     try:
         replace_file(path, lambda part: write(frame, part))
     except pl.exceptions.PolarsError as error:
         reason = str(error).splitlines()[0]
         raise OutputError("cannot be written", where=path, got=reason, remedy="is the disk full?") from error
+
+
+def log_ending(path: str | Path) -> str:
+    """Return the ending that tells the format of a log to write.
+
+    Raises
+    ------
+    OutputError
+        another ending.
+    """
+    name = Path(path).name.lower()
+    ending = next((ending for ending in _ENDINGS if name.endswith(ending)), None)
+    if ending is None:
+        raise OutputError("unknown ending", where=path, expected=", ".join(_ENDINGS))
+    return ending
 
 
 def recording_columns(recording: Recording) -> dict[str, FloatArray]:

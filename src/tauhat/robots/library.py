@@ -42,7 +42,7 @@ def load_robot(name_or_path: str | Path, *, locked: Mapping[str, float] | None =
         remedy = "give a URDF or a DH table instead"
         raise RobotError("MJCF robots are not supported yet", where=text[:200], remedy=remedy)
     if suffix in _URDF_SUFFIXES or _is_file(text):
-        return robot_from_urdf(Path(text), locked=locked)
+        return _from_urdf(Path(text), locked)
     remedy = f"{advice_on_name(text, builtin_names())}; or give the path of a .urdf or .toml file"
     raise RobotError("no such robot", where=text[:200], remedy=remedy)
 
@@ -60,6 +60,18 @@ def describe_builtins() -> dict[str, str]:
 
 def _builtin(name: str) -> Robot:
     return replace(robot_from_dh(_data(name)), source=f"built-in {name}")
+
+
+def _from_urdf(path: Path, locked: Mapping[str, float] | None) -> Robot:
+    """Return the robot of a URDF file; every error names the file."""
+    try:
+        return robot_from_urdf(path, locked=locked)
+    except RobotError as error:
+        if error.where.startswith(str(path)[:200]):
+            raise
+        raise RobotError(
+            error.what, where=f"{path}, {error.where}", expected=error.expected, got=error.got, remedy=error.remedy
+        ) from error
 
 
 def _data(name: str) -> str:

@@ -15,7 +15,7 @@ from tauhat.errors import RobotError
 from tauhat.robots.joint import Joint, Limits
 
 EARTH = (0.0, 0.0, -9.81)
-_MOST_JOINTS = 200
+_MOST_JOINTS = 100
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -129,14 +129,15 @@ def power_coherence(tau: FloatArray, dq: FloatArray) -> FloatArray:
 
 def _sign_findings(look: _Look) -> tuple[Finding, ...]:
     coherence = power_coherence(look.tau, look.dq)
-    friction = _friction_power(look)
-    reversed_joints = (coherence < -LEAST_COHERENCE) & (friction < 0)
+    agreement = _nominal_agreement(look)
+    driven = (coherence < -LEAST_COHERENCE) & (_friction_power(look) < 0) & (agreement < _LEAST_CORRELATION)
+    reversed_joints = driven | (agreement < -_LEAST_CORRELATION)
     names = look.model.robot.joint_names
     if reversed_joints.all() or reversed_joints.sum() > max(1, len(names) // 2):
         listed = ", ".join(name for name, bad in zip(names, reversed_joints, strict=True) if bad)
         return (
             Finding(
-                code="torque-sign",
+                code="torque_sign",
                 severity="error",
                 number=float(coherence.mean()),
                 message=f"the torque is logged with the sign reversed: friction seems to drive the motors on "
@@ -146,23 +147,50 @@ def _sign_findings(look: _Look) -> tuple[Finding, ...]:
         )
     doubtful = tuple(
         Finding(
-            code="torque-sign",
+            code="torque_sign",
             severity="warning",
             joint=names[joint],
             number=float(coherence[joint]),
-            message=f"{names[joint]}: friction comes out negative (power balance {coherence[joint]:+.2f}): torque or "
-            "position of this joint may have the sign reversed",
+            message=f"{names[joint]}: {_sign_reason(coherence[joint], agreement[joint])}: torque or position of this "
+            "joint may have the sign reversed",
             advice="compare with the sign of gravity at a held pose; `sign` in the map takes one value a joint",
         )
         for joint in np.flatnonzero(reversed_joints)
     )
     good = Finding(
-        code="torque-sign",
+        code="torque_sign",
         severity="ok",
         number=float(coherence.mean()),
         message=f"torque and motion have consistent signs (power balance {coherence.mean():+.2f})",
     )
     return doubtful or (good,)
+
+
+def _sign_reason(coherence: float, agreement: float) -> str:
+    if agreement < -_LEAST_CORRELATION:
+        return f"torque runs against the nominal model's (correlation {agreement:+.2f})"
+    return f"friction comes out negative (power balance {coherence:+.2f})"
+
+
+def _nominal_torque(look: _Look) -> FloatArray | None:
+    """Return the torque of the robot's nominal masses along the log, (n, n_v); None where they are unknown."""
+    robot = look.model.robot
+    if not robot.has_inertia or np.ptp(robot.inertia[:, 0]) == 0.0:
+        return None
+    return inverse_dynamics(robot, look.q, look.dq, look.ddq)
+
+
+def _nominal_agreement(look: _Look) -> FloatArray:
+    """Return each joint's correlation of measured with nominal torque, (n_v,); zero where nothing is known.
+
+    A joint that gravity rules hides a reversed sign from the power balance, but not from this.
+    """
+    nominal = _nominal_torque(look)
+    if nominal is None:
+        return np.zeros(look.model.robot.n_v)
+    spread = nominal.std(axis=0) * look.tau.std(axis=0)
+    together = np.mean((nominal - nominal.mean(axis=0)) * (look.tau - look.tau.mean(axis=0)), axis=0)
+    return np.asarray(together / np.where(spread > 0, spread, np.inf))
 
 
 def _friction_power(look: _Look) -> FloatArray:
@@ -183,11 +211,11 @@ def _delay_findings(look: _Look) -> tuple[Finding, ...]:
     delay = position_delay(look.model, look.base, [look.recording], plain)
     if not delay.certain:
         return (
-            Finding(code="torque-delay", severity="ok", message="no delay between torque and position can be told"),
+            Finding(code="torque_delay", severity="ok", message="no delay between torque and position can be told"),
         )
     late = "position is late against the torque" if delay.samples > 0 else "torque is late against the position"
     finding = Finding(
-        code="torque-delay",
+        code="torque_delay",
         severity="warning",
         number=delay.samples,
         message=f"{late} by about {abs(delay.samples):.2g} samples ({abs(delay.seconds) * 1e3:.3g} ms): "
@@ -228,22 +256,20 @@ def _excitation_findings(look: _Look) -> tuple[Finding, ...]:
 
 
 def _unit_findings(look: _Look) -> tuple[Finding, ...]:
-    robot = look.model.robot
-    masses = robot.inertia[:, 0]
-    if not robot.has_inertia or np.ptp(masses) == 0.0:
+    nominal = _nominal_torque(look)
+    if nominal is None:
         return ()
-    nominal = inverse_dynamics(robot, look.q, look.dq, look.ddq)
+    agreement = _nominal_agreement(look)
     findings = []
-    for joint, name in enumerate(robot.joint_names):
+    for joint, name in enumerate(look.model.robot.joint_names):
         measured, expected = look.tau[:, joint], nominal[:, joint]
         if np.std(expected) == 0 or np.std(measured) == 0:
             continue
-        correlation = float(np.corrcoef(measured, expected)[0, 1])
         ratio = float(np.std(measured) / np.std(expected))
-        if abs(correlation) > _LEAST_CORRELATION and not 1.0 / _LARGEST_RATIO < ratio < _LARGEST_RATIO:
+        if abs(agreement[joint]) > _LEAST_CORRELATION and not 1.0 / _LARGEST_RATIO < ratio < _LARGEST_RATIO:
             findings.append(
                 Finding(
-                    code="torque-unit",
+                    code="torque_scale",
                     severity="warning",
                     joint=name,
                     number=ratio,

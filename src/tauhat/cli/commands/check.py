@@ -39,10 +39,14 @@ class Options:
 def run(options: Options) -> None:
     """Say in plain words what is wrong or doubtful in logs; exit status 1 when one cannot be used."""
     from tauhat.cli.health import checked_log
+    from tauhat.dynamics.model import known_terms
     from tauhat.recordings.reading import read_log
     from tauhat.robots.library import load_robot
 
+    if options.lock and not options.robot:
+        raise typer.BadParameter("needs --robot, whose joints it locks", param_hint="'--lock'")
     robot = load_robot(options.robot, locked=options.lock) if options.robot else None
+    known_terms(options.model)
     with working("checking"):
         logs = [read_log(path, map=options.map_file, rows=options.rows) for path in options.logs]
         checked = [checked_log(log, robot=robot, terms=options.model) for log in logs]

@@ -35,7 +35,7 @@ class Options:
         Path, typer.Option("-o", "--output", metavar="FOLDER", help="Folder for what the demo makes.")
     ] = Path("tauhat-demo")
     robot: Annotated[str, typer.Option("--robot", metavar="ROBOT", help="Robot to simulate.")] = "ur5e"
-    seconds: Annotated[float, typer.Option("--seconds", min=2.0, max=3600.0, help="Length of each motion [s].")] = 20.0
+    seconds: Annotated[float, typer.Option("--seconds", min=2.0, max=3600.0, help="Length of each motion (s).")] = 20.0
     seed: SeedOption = 0
     as_json: JsonOption = False
 

@@ -58,8 +58,12 @@ def run(options: Options) -> None:
     from tauhat.dynamics.model import torque_model
     from tauhat.estimation.identify import identify
     from tauhat.estimation.least_squares import estimator_named
+    from tauhat.files import check_output
 
     estimator = estimator_named(options.estimator)
+    check_output(
+        options.output, inputs=[options.robot, *options.logs, *([options.map_file] if options.map_file else [])]
+    )
     with working("reading"):
         measured = read_recordings(options.logs, map_file=options.map_file, rows=options.rows)
         recordings = averaged(measured, period=options.period)

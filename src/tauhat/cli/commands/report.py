@@ -28,7 +28,7 @@ class Options:
     ]
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[LOG...]", help="Recordings to verify on and to draw.", show_default=False),
+        typer.Argument(metavar="LOG", help="Recordings to verify on and to draw.", show_default=False, readable=False),
     ] = None
     map_file: MapOption = None
     cutoff: CutoffOption = None
@@ -39,9 +39,11 @@ class Options:
 def run(options: Options) -> None:
     """Write a self-contained HTML report: health of the logs, prediction, parameters with error bars."""
     from tauhat.estimation.estimate import load_estimate
+    from tauhat.files import check_output
     from tauhat.report.page import write_report
 
     estimate = load_estimate(options.estimate)
+    check_output(options.output, inputs=[options.estimate, *(options.logs or ())])
     with working("checking and predicting"):
         verification, findings = _verified(estimate, options) if options.logs else (None, None)
     with working("drawing"):

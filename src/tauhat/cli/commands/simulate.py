@@ -31,16 +31,16 @@ class Options:
             "-o", "--output", metavar="LOG", help="Log to write: .parquet, .csv or .csv.gz.", show_default=False
         ),
     ]
-    seconds: Annotated[float, typer.Option("--seconds", min=1.0, max=3600.0, help="Length of the motion [s].")] = 20.0
+    seconds: Annotated[float, typer.Option("--seconds", min=1.0, max=3600.0, help="Length of the motion (s).")] = 20.0
     rate: Annotated[
-        float, typer.Option("--rate", min=10.0, max=10_000.0, help="Samples per second of the log [Hz].")
+        float, typer.Option("--rate", min=10.0, max=10_000.0, help="Samples per second of the log (Hz).")
     ] = 500.0
     harmonics: Annotated[int, typer.Option("--harmonics", min=2, max=50, help="Harmonics of the random motion.")] = 5
     noise: Annotated[
         float, typer.Option("--noise", min=0.0, max=10.0, help="Torque noise over each joint's RMS torque.")
     ] = 0.02
     quantisation: Annotated[
-        float, typer.Option("--quantisation", min=0.0, max=1.0, help="Step of the encoders [rad or m].")
+        float, typer.Option("--quantisation", min=0.0, max=1.0, help="Step of the encoders (rad or m).")
     ] = 2e-5
     spread: Annotated[
         float,
@@ -50,6 +50,10 @@ class Options:
     ] = 0.1
     lock: LockOption = None
     seed: SeedOption = 0
+    robot_seed: Annotated[
+        int,
+        typer.Option("--robot-seed", min=0, help="Seed of the true parameters: the same robot on several motions."),
+    ] = 0
     as_json: JsonOption = False
 
 
@@ -58,10 +62,14 @@ def run(options: Options) -> None:
     import numpy as np
 
     from tauhat.cli.experiment import Plan, run_experiment, write_experiment
+    from tauhat.files import check_output
+    from tauhat.recordings.writing import log_ending
     from tauhat.robots.library import load_robot
     from tauhat.simulation.parameters import perturbed
 
     robot = load_robot(options.robot, locked=options.lock)
+    log_ending(options.output)
+    check_output(options.output, inputs=[options.robot])
     rng = np.random.default_rng(options.seed)
     plan = Plan(
         seconds=options.seconds,
@@ -71,7 +79,7 @@ def run(options: Options) -> None:
         quantisation=options.quantisation,
     )
     with working(f"simulating {options.seconds:g} s of {robot.name}"):
-        truth = perturbed(robot, rng, spread=options.spread)
+        truth = perturbed(robot, np.random.default_rng(options.robot_seed), spread=options.spread)
         simulation = run_experiment(robot, plan, truth=truth, rng=rng)
         beside = write_experiment(robot, simulation, options.output, plan=plan, seed=options.seed)
     document = _document(simulation.recording, options, beside)
@@ -87,6 +95,7 @@ def _document(recording: Recording, options: Options, truth: Path) -> dict[str, 
         "samples": recording.n_t,
         "seconds": recording.duration,
         "seed": options.seed,
+        "robot_seed": options.robot_seed,
     }
 
 

@@ -1,0 +1,132 @@
+"""What a motion tells about a model: the information matrix, and the gradient of a criterion through the regressor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, IntArray, frozen, read_only
+from tauhat.dynamics.base import base_parameters, random_motion
+from tauhat.dynamics.model import Layout, TorqueModel
+from tauhat.dynamics.motion import Motion, MotionGradient
+from tauhat.errors import ExcitationError
+from tauhat.excitation.criteria import Criterion
+
+_SEED = 20240229
+_STATES = 2000
+SMOOTH_SIGN = 0.02  # width of the smooth sign while a motion is designed, in parts of the speed limit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Information:
+    """Which columns count, and by what constants they are scaled.
+
+    model : robot and terms, shapes settled
+    columns : (n,) indices of the base parameters that count
+    scales : (n,) RMS of each column over the equations of random states in the limits; a motion cannot change them
+    weights : (n_v,) of the joints, one over the torque noise
+    """
+
+    model: TorqueModel
+    columns: IntArray
+    scales: FloatArray
+    weights: FloatArray
+    layout: Layout
+
+    @property
+    def n(self) -> int:
+        """Number of columns."""
+        return int(self.columns.size)
+
+    def matrix(self, motion: Motion) -> FloatArray:
+        """Return `M = (1/N) sum_j w_j^2 A_j'A_j` with scaled columns, (n, n)."""
+        return self._matrix(self._rows(motion), motion.n_t)
+
+    def matrices(self, motion: Motion, count: int) -> FloatArray:
+        """Return M of each of `count` equally long motions that stand one after the other, (count, n, n)."""
+        rows = self._rows(motion).reshape(-1, count, motion.n_t // count)
+        matrices = np.zeros((count, self.n, self.n))
+        for joint, place in enumerate(self._places()):
+            part = rows[self.layout.of_joint(joint)].transpose(1, 0, 2)
+            matrices[:, place[:, None], place] += part @ part.transpose(0, 2, 1)
+        return matrices / (motion.n_t // count)
+
+    def evaluate(self, motion: Motion, criterion: Criterion) -> tuple[float, MotionGradient]:
+        """Return a criterion of the motion and its gradient with respect to q, dq, ddq, (n_v, n_t) each."""
+        rows = self._rows(motion)
+        value, slope = criterion.evaluate(self._matrix(rows, motion.n_t))
+        bars = np.empty_like(rows)
+        for joint, place in enumerate(self._places()):
+            part = self.layout.of_joint(joint)
+            bars[part] = (2.0 / motion.n_t) * slope[np.ix_(place, place)] @ rows[part]
+        return value, self.model.pull(motion, self.layout, bars * self._factors()[:, None])
+
+    def _rows(self, motion: Motion) -> FloatArray:
+        rows, _ = self.model.columns(motion, self.layout)
+        rows *= self._factors()[:, None]
+        return rows
+
+    def _matrix(self, rows: FloatArray, n_t: int) -> FloatArray:
+        matrix = np.zeros((self.n, self.n))
+        for joint, place in enumerate(self._places()):
+            part = rows[self.layout.of_joint(joint)]
+            matrix[np.ix_(place, place)] += part @ part.T
+        return matrix / n_t
+
+    def _places(self) -> list[IntArray]:
+        position = np.full(self.model.n_p, -1)
+        position[self.columns] = np.arange(self.n)
+        rows = [self.layout.of_joint(joint) for joint in range(self.model.robot.n_v)]
+        return [position[self.layout.parameters[part]] for part in rows]
+
+    def _factors(self) -> FloatArray:
+        position = np.full(self.model.n_p, -1)
+        position[self.columns] = np.arange(self.n)
+        joints = np.repeat(np.arange(self.model.robot.n_v), np.diff(self.layout.bounds))
+        return np.asarray(self.weights[joints] / self.scales[position[self.layout.parameters]])
+
+
+def information(
+    model: TorqueModel, *, terms: Iterable[str] = (), torque_noise: FloatArray | None = None
+) -> Information:
+    """Return what counts when motions for this model are compared.
+
+    Parameters
+    ----------
+    terms : keys of the terms whose columns count; all by default
+    torque_noise : (n_v,) deviation of each joint's torque noise [Nm or N]; all alike by default
+
+    Raises
+    ------
+    ExcitationError
+        when no column is left, or a noise is not positive.
+    """
+    wanted = set(terms) or {term.key for term in model.terms}
+    owner = [term.key for term in model.terms for _ in term.parameters(model.robot)]
+    base = base_parameters(model)
+    columns = np.array([index for index in base.independent if owner[index] in wanted], dtype=np.intp)
+    if not columns.size:
+        raise ExcitationError("no column of the model is among the terms asked for", got=", ".join(sorted(wanted)))
+    noise = frozen(
+        "torque_noise", np.ones(model.robot.n_v) if torque_noise is None else torque_noise, (model.robot.n_v,)
+    )
+    if not (noise > 0).all():
+        raise ExcitationError("torque noise must be positive", got=noise.tolist())
+    layout = model.layout(columns)
+    return Information(
+        model=model,
+        columns=read_only(columns),
+        scales=read_only(_scales(model, layout, columns)),
+        weights=read_only(1.0 / noise),
+        layout=layout,
+    )
+
+
+def _scales(model: TorqueModel, layout: Layout, columns: IntArray) -> FloatArray:
+    states = random_motion(model.robot, _STATES, np.random.default_rng(_SEED))
+    rows, _ = model.columns(states, layout)
+    squares = np.zeros(model.n_p)
+    np.add.at(squares, layout.parameters, np.mean(rows**2, axis=1))
+    return np.asarray(np.sqrt(squares[columns] / model.robot.n_v))
