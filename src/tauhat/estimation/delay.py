@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,11 +26,13 @@ from tauhat.recordings.filters import filtered, high_pass
 from tauhat.recordings.processing import Processing, clock_step
 from tauhat.recordings.recording import Recording
 
-LAGS = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0)  # [samples]
+SPAN = np.arange(-4.0, 4.5)  # of one scan, in parts of its spacing
+_FINE, _COARSE = 0.5, 2.0  # [samples] spacing of the scans
 _BANDS = ((0.04, 0.4), (0.06, 0.6), (0.1, 1.0))  # lower and upper frequency, in parts of the cut-off
 _MOTION = 3.0  # cut-off of the position over the upper frequency
 _WIDTH = 0.03  # of the smooth sign in the scan, in parts of the top speed: a sharp one hides the lag
-_SMALLEST, _LARGEST = 0.4, 1.2  # [samples] lags that are believed
+_SMALLEST, _LARGEST = 0.4, 1.2  # [samples] lags that are acted on
+_EVIDENT_DROP = 0.2  # of the residual, from which a longer lag is acted on, too
 _AGREEMENT = 0.4  # [samples] between the bands
 _LEAST_DROP = 0.04  # of the residual, in every band
 _MOST_SAMPLES = 10_000
@@ -42,41 +45,67 @@ class Delay:
 
     samples, seconds : the lag at which the fit is best, median of the bands; infinite where none was found
     drop : by what part the residual falls at that lag, in the band where it falls least
-    certain : whether all bands agree on a lag of 0.4 to 1.2 samples that lowers the residual by 4 %
+    agreed : whether all bands agree on a lag of at least 0.4 samples that lowers the residual by 4 %
+    certain : agreed, and either at most 1.2 samples, the usual fault of a logger, or lowering the residual by 20 %
     """
 
     samples: float
     seconds: float
     drop: float
+    agreed: bool
     certain: bool
+
+    @property
+    def words(self) -> str:
+        """The delay in words: which is late against which, and by how much."""
+        late = "position is late against the torque" if self.samples > 0 else "torque is late against the position"
+        return f"{late} by {abs(self.seconds) * 1e3:.2g} ms ({abs(self.samples):.2g} samples)"
 
 
 def position_delay(
     model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], processing: Processing
 ) -> Delay:
-    """Return the delay of the position against the torque; the longest recording is scanned."""
+    """Return the delay of the position against the torque; the longest recording is scanned, at most 8 samples far."""
     recording = max(recordings, key=lambda item: item.n_t)
     recording = recording.rows(0, min(recording.n_t, _MOST_SAMPLES))
-    step = clock_step(recording)
     scanned = _blunted(model, recording)
-    minima, drops = [], []
+    scan = partial(_scan, scanned, base, recording, processing)
+    minima, drops = scan(centre=0.0, spacing=_FINE)
+    if np.isinf(minima).all() and abs(np.sign(minima).sum()) == len(_BANDS):
+        minima, drops = scan(centre=0.0, spacing=_COARSE)
+        if np.isfinite(minima).all():
+            minima, drops = scan(centre=round(float(np.median(minima))), spacing=_FINE)
+    samples, drop = float(np.median(minima)), float(drops.min())
+    sizes = np.abs(minima)
+    close = bool(np.isfinite(sizes).all() and np.ptp(minima) <= _AGREEMENT)
+    agreed = close and sizes.min() >= _SMALLEST and drop >= _LEAST_DROP
+    certain = agreed and (sizes.max() <= _LARGEST or drop >= _EVIDENT_DROP)
+    seconds = samples * clock_step(recording)
+    return Delay(samples=samples, seconds=seconds, drop=drop, agreed=bool(agreed), certain=bool(certain))
+
+
+def _scan(
+    model: TorqueModel,
+    base: BaseParameters,
+    recording: Recording,
+    processing: Processing,
+    *,
+    centre: float,
+    spacing: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return for each band the best lag around `centre` [samples] and by what part the residual falls there."""
+    lags = centre + spacing * SPAN
+    found = []
     for lower, upper in _BANDS:
         cutoff = upper * processing.cutoff
         settings = Processing(cutoff=cutoff, motion_cutoff=_MOTION * cutoff)
+        step = clock_step(recording)
         levels = [
-            band_residual(
-                scanned, base, recording, replace(settings, delay=lag * step), lower=lower * processing.cutoff
-            )
-            for lag in LAGS
+            band_residual(model, base, recording, replace(settings, delay=lag * step), lower=lower * processing.cutoff)
+            for lag in (0.0, *lags)
         ]
-        lag, drop = _vertex(np.array(levels))
-        minima.append(lag)
-        drops.append(drop)
-    samples, drop = float(np.median(minima)), float(min(drops))
-    sizes = np.abs(minima)
-    believable = sizes.min() >= _SMALLEST and sizes.max() <= _LARGEST and drop >= _LEAST_DROP
-    certain = bool(believable and np.ptp(minima) <= _AGREEMENT)
-    return Delay(samples=samples, seconds=samples * step, drop=drop, certain=certain)
+        found.append(_vertex(lags, np.array(levels[1:]), at_zero=levels[0]))
+    return np.array([lag for lag, _ in found]), np.array([drop for _, drop in found])
 
 
 def _blunted(model: TorqueModel, recording: Recording) -> TorqueModel:
@@ -104,13 +133,12 @@ def band_residual(
     return float(np.linalg.norm(joint_residuals(evidence, values) * weights))
 
 
-def _vertex(levels: FloatArray) -> tuple[float, float]:
+def _vertex(lags: FloatArray, levels: FloatArray, *, at_zero: float) -> tuple[float, float]:
     """Return the lag of the least residual by a parabola through its neighbours, and by what part it falls there."""
     k = int(levels.argmin())
     if k in {0, levels.size - 1}:
-        return float(np.copysign(np.inf, LAGS[k])), 0.0
+        return float(np.copysign(np.inf, k - 1)), 0.0
     left, middle, right = levels[k - 1 : k + 2] ** 2
     shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
     least = middle - 0.25 * (left - right) * shift
-    at_zero = levels[LAGS.index(0.0)]
-    return float(LAGS[k] + shift * (LAGS[1] - LAGS[0])), 1.0 - float(np.sqrt(max(least, 0.0))) / float(at_zero)
+    return float(lags[k] + shift * (lags[1] - lags[0])), 1.0 - float(np.sqrt(max(least, 0.0))) / at_zero

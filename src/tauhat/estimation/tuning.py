@@ -57,8 +57,7 @@ def tuned(
     if delay.certain:
         settings = replace(settings, delay=delay.seconds)
         warnings.warn(
-            f"position is logged {delay.seconds * 1e3:.2g} ms ({delay.samples:.2g} samples) late against the torque: "
-            "compensated",
+            f"{delay.words}: compensated",
             TauhatWarning,
             stacklevel=3,
         )

@@ -32,6 +32,8 @@ WEAK_PARAMETER = 0.5  # relative standard error above which a parameter is not s
 _LARGEST_RATIO = 20.0  # measured over nominal torque beyond which units cannot be right
 _LEAST_CORRELATION = 0.8  # with the nominal torque, for its size to say something about units
 _WEAK_CONDITION = 100.0
+_COMPENSATED = "`identify` compensates it by itself; to fix it, set `delay_samples` in the map's [position] section"
+_LEFT_ALONE = "a filter in the drive does that; `identify` leaves it alone, `delay_samples` in the map shifts it"
 _AXIS_TERMS = ("rotor", "viscous", "coulomb", "offset")
 
 
@@ -209,18 +211,16 @@ def _delay_findings(look: _Look) -> tuple[Finding, ...]:
     settings = look.estimate.processing
     plain = Processing(cutoff=settings.cutoff, motion_cutoff=settings.motion_cutoff)
     delay = position_delay(look.model, look.base, [look.recording], plain)
-    if not delay.certain:
+    if not delay.agreed:
         return (
             Finding(code="torque_delay", severity="ok", message="no delay between torque and position can be told"),
         )
-    late = "position is late against the torque" if delay.samples > 0 else "torque is late against the position"
     finding = Finding(
         code="torque_delay",
-        severity="warning",
+        severity="warning" if delay.certain else "note",
         number=delay.samples,
-        message=f"{late} by about {abs(delay.samples):.2g} samples ({abs(delay.seconds) * 1e3:.3g} ms): "
-        f"the residual falls by {100 * delay.drop:.0f} % when it is shifted",
-        advice="`identify` compensates it by itself; to fix it, set `delay_samples` in the map's [position] section",
+        message=f"{delay.words}: the residual falls by {100 * delay.drop:.0f} % when it is shifted",
+        advice=_COMPENSATED if delay.certain else _LEFT_ALONE,
     )
     return (finding,)
 
