@@ -18,6 +18,7 @@ def single_threaded(action: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(action)
     def limited(*args: P.args, **kwargs: P.kwargs) -> R:
+        import scipy.linalg.lapack  # noqa: F401 (only a BLAS that is loaded can be limited, and SciPy brings its own)
         from threadpoolctl import threadpool_limits
 
         with threadpool_limits(limits=1, user_api="blas"):
