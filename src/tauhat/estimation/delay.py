@@ -35,7 +35,7 @@ _SMALLEST, _LARGEST = 0.4, 1.2  # [samples] lags that are acted on
 _EVIDENT_DROP = 0.2  # of the residual, from which a longer lag is acted on, too
 _AGREEMENT = 0.4  # [samples] between the bands
 _LEAST_DROP = 0.04  # of the residual, in every band
-_MOST_SAMPLES = 10_000
+_MOST_SAMPLES = 8_000
 _RIDGE = 1e-6  # offsets vanish in a band: their columns are nearly zero
 
 
@@ -71,7 +71,8 @@ def position_delay(
     scanned = _blunted(model, recording)
     scan = partial(_scan, scanned, base, recording, processing)
     minima, drops = scan(centre=0.0, spacing=_FINE)
-    if np.isinf(minima).all() and abs(np.sign(minima).sum()) == len(_BANDS):
+    one_sided = np.isinf(minima).all() and abs(np.sign(minima).sum()) == len(_BANDS)
+    if one_sided and drops.min() >= _LEAST_DROP:
         minima, drops = scan(centre=0.0, spacing=_COARSE)
         if np.isfinite(minima).all():
             minima, drops = scan(centre=round(float(np.median(minima))), spacing=_FINE)
@@ -93,7 +94,10 @@ def _scan(
     centre: float,
     spacing: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return for each band the best lag around `centre` [samples] and by what part the residual falls there."""
+    """Return for each band the best lag around `centre` [samples] and by what part the residual falls there.
+
+    The scan ends at the first band in which it hardly falls: the bands cannot agree any more.
+    """
     lags = centre + spacing * SPAN
     found = []
     for lower, upper in _BANDS:
@@ -105,6 +109,8 @@ def _scan(
             for lag in (0.0, *lags)
         ]
         found.append(_vertex(lags, np.array(levels[1:]), at_zero=levels[0]))
+        if found[-1][1] < _LEAST_DROP:
+            break
     return np.array([lag for lag, _ in found]), np.array([drop for _, drop in found])
 
 
@@ -137,7 +143,7 @@ def _vertex(lags: FloatArray, levels: FloatArray, *, at_zero: float) -> tuple[fl
     """Return the lag of the least residual by a parabola through its neighbours, and by what part it falls there."""
     k = int(levels.argmin())
     if k in {0, levels.size - 1}:
-        return float(np.copysign(np.inf, k - 1)), 0.0
+        return float(np.copysign(np.inf, k - 1)), 1.0 - float(levels[k]) / at_zero
     left, middle, right = levels[k - 1 : k + 2] ** 2
     shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
     least = middle - 0.25 * (left - right) * shift

@@ -24,7 +24,7 @@ from tauhat.recordings.choice import MOTION_CUTOFF, choose_processing, top_speed
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 
-MOST_SAMPLES = 30_000  # settings are chosen on so many samples at most
+MOST_SAMPLES = 20_000  # settings are chosen on so many samples at most
 _LEAST_GAIN = 0.005  # a candidate must leave that much less residual to replace the default
 
 
