@@ -12,9 +12,11 @@ import typer
 from typer.testing import CliRunner
 
 from tauhat.cli.app import app
+from tauhat.errors import ExcitationError
 from tauhat.estimation import load_estimate
+from tauhat.excitation.limits.limits_file import parse_limits
 from tauhat.recordings import load_map, parse_map
-from tauhat.robots import robot_from_dh
+from tauhat.robots import load_robot, robot_from_dh
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")])
@@ -94,11 +96,20 @@ def test_the_base_parameters_shown_are_those_printed(capsys):
     assert capsys.readouterr().out.strip() == block.rpartition("  # ")[2].strip()
 
 
+@pytest.mark.filterwarnings("ignore::tauhat.errors.TauhatWarning")  # capsules of the limits page lie on other links
 @pytest.mark.parametrize("page", pages_with("toml"), ids=lambda page: page.stem)
 def test_maps_and_tables_shown_are_such(page):
     for block in blocks(page, "toml"):
         if "[[joints]]" in block:
             assert robot_from_dh(block).joint_names == ("shoulder", "elbow")
+            continue
+        if "[collision]" in block:
+            with pytest.raises(ExcitationError, match=r"fixture\.stl"):  # the one thing that the page does not have
+                parse_limits(block, load_robot("ur5e"))
+            whole = block[: block.index("[[meshes]]")]
+            kept = parse_limits(whole, load_robot("ur5e"))
+            assert len(kept.others) >= 4
+            assert kept.home is not None
             continue
         log_map = parse_map(block)
         assert len(log_map.position.columns) == len(log_map.torque.columns) == 6

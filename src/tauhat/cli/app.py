@@ -12,7 +12,7 @@ import typer
 
 import tauhat
 from tauhat.cli.adapter import as_command
-from tauhat.cli.commands import check, demo, excite, identify, inspect, report, robots, simulate, verify
+from tauhat.cli.commands import check, demo, excite, identify, inspect, report, robots, simulate, verify, view
 from tauhat.cli.reporting import ReportingGroup
 
 app = typer.Typer(
@@ -33,6 +33,7 @@ app.command("simulate")(as_command(simulate.run, simulate.Options))
 app.command("identify")(as_command(identify.run, identify.Options))
 app.command("verify")(as_command(verify.run, verify.Options))
 app.command("report")(as_command(report.run, report.Options))
+app.command("view")(as_command(view.run, view.Options))
 
 
 def _show_version(wanted: bool) -> None:

@@ -131,6 +131,21 @@ def base_parameters(model: TorqueModel, *, tolerance: float = RANK_TOLERANCE) ->
     )
 
 
+def independent_among(model: TorqueModel, wanted: IntArray, *, tolerance: float = RANK_TOLERANCE) -> IntArray:
+    """Return which of the `wanted` parameters are independent of each other, whatever the others are; sorted indices.
+
+    A payload changes the ten parameters of one link: what matters is whether these can be told apart, not whether they
+    can be told from the rest.
+    """
+    triangle, norms = _sampled_triangle(model)
+    visible = _visible(model, norms)
+    order = np.array(sorted((int(index) for index in wanted if visible[index]), key=lambda i: _preference(model, i)))
+    if not order.size:
+        return np.zeros(0, dtype=np.intp)
+    independent, _ = _sift(triangle / np.where(visible, norms, 1.0), order, tolerance)
+    return independent
+
+
 def _preference(model: TorqueModel, index: int) -> tuple[int, int, int]:
     parameter = model.parameters[index]
     if parameter.symbol in _PREFERENCE:

@@ -14,12 +14,21 @@ from tauhat.excitation.design import METHODS, Design, DesignSettings, Method, de
 from tauhat.excitation.fourier import FourierSeries, fourier_basis, random_fourier, rest_basis
 from tauhat.excitation.genetic import GeneticSettings
 from tauhat.excitation.information import Information, information
-from tauhat.excitation.limits import MotionLimits, motion_limits
+from tauhat.excitation.limits import (
+    FAR,
+    LimitSet,
+    MotionLimit,
+    MotionLimits,
+    load_limits,
+    motion_limits,
+    parse_limits,
+)
 from tauhat.excitation.space import FourierSpace, SampledSpace, random_points
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
 
 __all__ = [
     "CRITERIA",
+    "FAR",
     "METHODS",
     "AOptimal",
     "ConditionNumber",
@@ -32,8 +41,10 @@ __all__ = [
     "FourierSpace",
     "GeneticSettings",
     "Information",
+    "LimitSet",
     "Method",
     "Mixed",
+    "MotionLimit",
     "MotionLimits",
     "MotionSamples",
     "SampledSpace",
@@ -43,8 +54,10 @@ __all__ = [
     "fourier_basis",
     "information",
     "limit_margins",
+    "load_limits",
     "method_named",
     "motion_limits",
+    "parse_limits",
     "random_fourier",
     "random_points",
     "rest_basis",

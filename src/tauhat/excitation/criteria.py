@@ -42,6 +42,10 @@ class Criterion(ABC):
         """Return value and slope with the smallest eigenvalues lifted to `FLOOR` times the largest."""
         return self.of_spectrum(np.maximum(eigenvalues, FLOOR * eigenvalues[-1]))
 
+    def size(self, n: int) -> float:  # noqa: ARG002 - for those that grow with it
+        """Return how much the criterion changes, for n columns, where all eigenvalues change by a factor e."""
+        return 1.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionNumber(Criterion):
@@ -78,6 +82,10 @@ class DOptimal(Criterion):
     def of_spectrum(self, eigenvalues: FloatArray) -> tuple[float, FloatArray]:
         """Return value and slope."""
         return -float(np.log(eigenvalues).sum()), -1.0 / eigenvalues
+
+    def size(self, n: int) -> float:
+        """Return the number of columns: each adds its own logarithm."""
+        return float(n)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

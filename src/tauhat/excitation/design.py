@@ -17,9 +17,11 @@ from tauhat.errors import ExcitationError
 from tauhat.excitation.criteria import Criterion, Mixed
 from tauhat.excitation.fourier import FourierSeries
 from tauhat.excitation.genetic import GeneticSettings, Progress, evolve
-from tauhat.excitation.gradient import polish
+from tauhat.excitation.gradient import SAMPLES, polish
+from tauhat.excitation.guard import FINER, Guard
 from tauhat.excitation.information import SMOOTH_SIGN, Information, information
-from tauhat.excitation.limits import MotionLimits, motion_limits
+from tauhat.excitation.limits import LimitSet, MotionLimits
+from tauhat.excitation.poses import guard_of
 from tauhat.excitation.space import FourierSpace, random_points
 from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot
@@ -27,7 +29,7 @@ from tauhat.robots.robot import Robot
 Method: TypeAlias = Literal["genetic", "gradient", "both"]
 METHODS: tuple[Method, ...] = ("genetic", "gradient", "both")
 
-_REPORT_SAMPLES = 2000
+_REPORT_SAMPLES = FINER * SAMPLES
 
 
 def method_named(name: str) -> Method:
@@ -53,7 +55,8 @@ class Design:
     log_det : of the scaled information matrix
     mean_error : root mean variance of the scaled parameters at unit torque noise
     seconds, evaluations : what the search took
-    margins : smallest unused part of each limit, over all joints and times
+    margins : smallest unused part of each limit, over all joints and times; of distances, what is beyond the clearance
+        in parts of 0.1 m
     """
 
     trajectory: FourierSeries
@@ -95,6 +98,7 @@ class DesignSettings:
     starts : random starts of the gradient method
     margin : part of every limit that is left unused
     genetic : settings of the genetic search
+    limits : further limits than the robot's own, or others
     """
 
     period: float = 10.0
@@ -103,6 +107,7 @@ class DesignSettings:
     starts: int = 1
     margin: float = 0.05
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
+    limits: LimitSet | None = None
 
     def __post_init__(self) -> None:
         method_named(self.method)
@@ -138,19 +143,57 @@ def design(
     """
     wanted, chosen = settings or DesignSettings(), criterion or Mixed()
     began = time.perf_counter()
-    limits = motion_limits(robot, margin=wanted.margin)
-    space = FourierSpace(limits=limits, period=wanted.period, harmonics=wanted.harmonics)
-    facts = information(_smooth(torque_model(robot, terms), limits))
-    if wanted.method == "gradient":
-        points, evaluations = _polished_starts(facts, space, chosen, wanted, rng)
-    else:
-        found, evaluations = evolve(facts, space, criterion=chosen, rng=rng, settings=wanted.genetic, progress=progress)
-        points = [found]
-    if wanted.method == "both":
-        found, more = polish(facts, space, points[0], criterion=chosen)
-        points, evaluations = [*points, found], evaluations + more
-    best = min(points, key=lambda point: _value(facts, space, point, chosen))
-    return _design(robot, facts, space, best, seconds=time.perf_counter() - began, evaluations=evaluations)
+    limits = wanted.limits or LimitSet(robot=robot)
+    limits.check_robot(robot)
+    of_joints = limits.of_joints(margin=wanted.margin)
+    space = FourierSpace(limits=of_joints, period=wanted.period, harmonics=wanted.harmonics)
+    facts = information(_smooth(torque_model(limits.robot, terms), of_joints))
+    guard = None
+    if limits.others:
+        guard = guard_of(space, limits, margin=wanted.margin, samples=SAMPLES, rng=rng)
+    search = _Search(facts=facts, space=space, criterion=chosen, settings=wanted, guard=guard)
+    best, evaluations = search.run(rng, progress)
+    return _design(limits, facts, space, best, seconds=time.perf_counter() - began, evaluations=evaluations)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Search:
+    facts: Information
+    space: FourierSpace
+    criterion: Criterion
+    settings: DesignSettings
+    guard: Guard | None
+
+    def run(self, rng: np.random.Generator, progress: Progress | None) -> tuple[FloatArray, int]:
+        """Return the best point and the number of evaluations."""
+        if self.settings.method == "gradient":
+            points, evaluations = self._polished(random_points(self.space, self.settings.starts, rng))
+        else:
+            found, evaluations = evolve(
+                self.facts,
+                self.guard or self.space,
+                criterion=self.criterion,
+                rng=rng,
+                settings=self.settings.genetic,
+                progress=progress,
+            )
+            points = [found]
+        if self.settings.method == "both":
+            better, more = self._polished(points[0][None])
+            points, evaluations = [*points, *better], evaluations + more
+        return min(points, key=self._value), evaluations
+
+    def _polished(self, starts: FloatArray) -> tuple[list[FloatArray], int]:
+        points, evaluations = [], 0
+        for start in starts:
+            found, count = polish(self.facts, self.space, start, criterion=self.criterion, guard=self.guard)
+            points.append(found)
+            evaluations += count
+        return points, evaluations
+
+    def _value(self, point: FloatArray) -> float:
+        grid = self.space.grid(_REPORT_SAMPLES)
+        return self.criterion.evaluate(self.facts.matrix(grid.motion(point)))[0]
 
 
 def _smooth(model: TorqueModel, limits: MotionLimits) -> TorqueModel:
@@ -160,30 +203,15 @@ def _smooth(model: TorqueModel, limits: MotionLimits) -> TorqueModel:
     return model.with_term(Coulomb(widths=tuple((SMOOTH_SIGN * limits.velocity).tolist())))
 
 
-def _polished_starts(
-    facts: Information, space: FourierSpace, criterion: Criterion, settings: DesignSettings, rng: np.random.Generator
-) -> tuple[list[FloatArray], int]:
-    points, evaluations = [], 0
-    for start in random_points(space, settings.starts, rng):
-        found, count = polish(facts, space, start, criterion=criterion)
-        points.append(found)
-        evaluations += count
-    return points, evaluations
-
-
-def _value(facts: Information, space: FourierSpace, point: FloatArray, criterion: Criterion) -> float:
-    return criterion.evaluate(facts.matrix(space.grid(_REPORT_SAMPLES).motion(point)))[0]
-
-
 def _design(
-    robot: Robot, facts: Information, space: FourierSpace, point: FloatArray, *, seconds: float, evaluations: int
+    limits: LimitSet, facts: Information, space: FourierSpace, point: FloatArray, *, seconds: float, evaluations: int
 ) -> Design:
     model = facts.model
     if any(term.key == Coulomb.key for term in model.terms):
         facts = replace(facts, model=model.with_term(Coulomb()))
     eigenvalues = np.linalg.eigvalsh(facts.matrix(space.grid(_REPORT_SAMPLES).motion(point)))
     if eigenvalues[0] <= 0.0:
-        raise ExcitationError("the motion leaves a column of the model without excitation", where=robot.name)
+        raise ExcitationError("the motion leaves a column of the model without excitation", where=limits.robot.name)
     series = space.series(point)
     return Design(
         trajectory=series,
@@ -192,17 +220,25 @@ def _design(
         mean_error=float(np.sqrt(np.mean(1.0 / eigenvalues))),
         seconds=seconds,
         evaluations=evaluations,
-        margins=limit_margins(series, motion_limits(robot)),
+        margins=limit_margins(series, limits.of_joints()) | _further_margins(space, point, limits),
     )
 
 
 def limit_margins(series: FourierSeries, limits: MotionLimits) -> dict[str, float]:
-    """Return the smallest unused part of the position, velocity and acceleration limits, at all times."""
+    """Return the smallest unused part of the position, velocity, acceleration and jerk limits, at all times."""
     hull = series.envelope()
     reach = 0.5 * (limits.upper - limits.lower)
     position = np.minimum(hull.lower - limits.lower, limits.upper - hull.upper) / reach
-    return {
+    margins = {
         "position": float(position.min()),
         "velocity": float((1.0 - hull.velocity / limits.velocity).min()),
         "acceleration": float((1.0 - hull.acceleration / limits.acceleration).min()),
     }
+    if limits.jerk is not None:
+        margins["jerk"] = float((1.0 - series.largest_jerk() / limits.jerk).min())
+    return margins
+
+
+def _further_margins(space: FourierSpace, point: FloatArray, limits: LimitSet) -> dict[str, float]:
+    motion = space.grid(_REPORT_SAMPLES).motion(point)
+    return {limit.name: float(limit.margins(motion).min()) for limit in limits.others}

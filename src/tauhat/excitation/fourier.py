@@ -16,6 +16,7 @@ FEWEST_HARMONICS = 2  # with one harmonic, rest at the start leaves no motion
 _REST = 1e-9  # initial velocity and acceleration, relative to the sum of the amplitudes, that counts as rest
 _ENVELOPE_POINTS = 128  # grid points per period of the fastest harmonic
 _SLACK = 1e-12  # rounding errors of an envelope, relative
+_WIDEN = float((1.0 + _SLACK) / np.cos(np.pi / _ENVELOPE_POINTS))  # from a maximum over the points to one of all times
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -129,9 +130,7 @@ class FourierSeries:
 
         Source: M. Riesz, "Eine trigonometrische Interpolationsformel ...", 1914.
         """
-        count = _ENVELOPE_POINTS * self.n_h
-        grid = self.sample(np.linspace(0.0, self.period, count, endpoint=False, dtype=np.float64))
-        widen = (1.0 + _SLACK) / np.cos(np.pi / _ENVELOPE_POINTS)
+        grid, widen = self.sample(self._fine_times()), _WIDEN
         highest, lowest = grid.q.max(axis=0), grid.q.min(axis=0)
         middle, reach = 0.5 * (highest + lowest), 0.5 * widen * (highest - lowest)
         return Envelope(
@@ -140,6 +139,20 @@ class FourierSeries:
             velocity=widen * np.abs(grid.dq).max(axis=0),
             acceleration=widen * np.abs(grid.ddq).max(axis=0),
         )
+
+    def largest_jerk(self) -> FloatArray:
+        """Return a bound of each joint's change of acceleration at all times, (n_v,) [rad/s^3 or m/s^3]."""
+        basis = jerk_basis(self._fine_times(), period=self.period, harmonics=self.n_h)
+        return np.asarray(_WIDEN * np.abs(basis @ self.coefficients.T).max(axis=0))
+
+    def _fine_times(self) -> FloatArray:
+        return np.linspace(0.0, self.period, _ENVELOPE_POINTS * self.n_h, endpoint=False, dtype=np.float64)
+
+
+def jerk_basis(t: FloatArray, *, period: float, harmonics: int) -> FloatArray:
+    """Return the functions whose sums are the change of acceleration, (n_t, 2 n_h)."""
+    speed = np.tile(2.0 * np.pi / period * np.arange(1, harmonics + 1), 2)
+    return -(speed**2) * fourier_basis(t, period=period, harmonics=harmonics)[1]
 
 
 def fourier_basis(t: FloatArray, *, period: float, harmonics: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,7 +1,9 @@
 """Genetic design: a whole population of motions in one batched call, every one inside the joint limits.
 
 Individuals are points of the `FourierSpace`, shrunk onto the joint limits before they are judged, so that none is lost
-to infeasibility. Crossover and mutation are pymoo's (simulated binary crossover, polynomial mutation).
+to infeasibility. Where limits of several joints at once count too, those that keep them come first, ranked by the
+criterion; the others follow, ranked by what they exceed. Crossover and mutation are pymoo's (simulated binary
+crossover, polynomial mutation).
 
 Source: Deb, Agrawal, "Simulated binary crossover for continuous search space", 1995.
 """
@@ -17,10 +19,12 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ExcitationError, MissingExtraError
 from tauhat.excitation.criteria import Criterion
+from tauhat.excitation.guard import Guard
 from tauhat.excitation.information import Information
 from tauhat.excitation.space import FourierSpace, SampledSpace, random_points
 
 SAMPLES = 100  # per period while searching
+_OUTSIDE = 1e6  # above every criterion: what a motion outside its limits is worth at best
 
 Progress = Callable[[int, float], None]
 
@@ -55,7 +59,7 @@ def population_values(
 
 def evolve(
     information: Information,
-    space: FourierSpace,
+    room: FourierSpace | Guard,
     *,
     criterion: Criterion,
     rng: np.random.Generator,
@@ -66,6 +70,7 @@ def evolve(
 
     Parameters
     ----------
+    room : the space to search in, or the guard that keeps limits of several joints at once in one
     progress : called after each generation with its number and the best criterion so far
 
     Raises
@@ -74,13 +79,17 @@ def evolve(
         when pymoo is not installed.
     """
     chosen = settings or GeneticSettings()
-    algorithm = _algorithm(space, chosen, rng)
+    space, guard = (room.space, room) if isinstance(room, Guard) else (room, None)
+    algorithm = _algorithm(space, chosen, rng, guard)
     grid = space.grid(SAMPLES)
     best, value = None, np.inf
     for generation in range(chosen.generations):
         population = algorithm.ask()
         points = np.array([space.shrunk(genes) for genes in population.get("X")])
         values = population_values(information, grid, points, criterion)
+        if guard is not None:
+            excess = guard.violations(points)
+            values = np.where(excess > 0.0, _OUTSIDE + excess, values)
         population.set("F", values[:, None])
         algorithm.tell(infills=population)
         if values.min() < value:
@@ -89,16 +98,19 @@ def evolve(
             progress(generation + 1, value)
     if best is None:
         raise ExcitationError("the genetic search found no motion", where=information.model.robot.name)
-    return np.asarray(best), chosen.population * chosen.generations
+    settled = best if guard is None else guard.settled(best)
+    return np.asarray(settled), chosen.population * chosen.generations
 
 
-def _algorithm(space: FourierSpace, settings: GeneticSettings, rng: np.random.Generator) -> Any:
+def _algorithm(space: FourierSpace, settings: GeneticSettings, rng: np.random.Generator, guard: Guard | None) -> Any:
     try:
         from pymoo.algorithms.soo.nonconvex.ga import GA
         from pymoo.core.problem import Problem
     except ImportError as error:
         raise MissingExtraError("pymoo", "excitation") from error
     start = random_points(space, settings.population, rng)
+    if guard is not None:
+        start = np.array([guard.one_start(point, index) for index, point in enumerate(start)])
     reach = 1.5 * np.abs(start).max(axis=0).ravel() + 1e-12
     problem = Problem(n_var=reach.size, n_obj=1, xl=-reach, xu=reach)
     algorithm = GA(pop_size=settings.population, sampling=start.reshape(settings.population, -1))

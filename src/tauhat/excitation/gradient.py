@@ -3,28 +3,45 @@
 Two stages. (1) A soft gauge map sends any point inside: each joint's coefficients are divided by
 `s = (1 + sum |r|^p)^(1/p)`, which is above the largest |r|; the criterion of the image is minimised without constraints
 by L-BFGS while the criterion gets sharper. (2) The map keeps a distance from the limits; a logarithmic barrier lets the
-motion use them fully, minimised by BFGS that starts from the barrier's own Hessian.
+motion use them fully. A criterion that does not get sharper needs one run of the first stage.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.excitation.criteria import ConditionNumber, Criterion, Mixed
+from tauhat.excitation.barrier import Barrier, descend
+from tauhat.excitation.criteria import ConditionNumber, Criterion, EOptimal, Mixed
+from tauhat.excitation.guard import Guard
 from tauhat.excitation.information import Information
 from tauhat.excitation.space import FourierSpace, SampledSpace
 
 SAMPLES = 200  # per period while optimising; on more the criterion changes by about one per cent
 LIMIT_SAMPLES = 100  # per period at which limits are held while optimising; the result is shrunk exactly
-_SHARPNESS = (4.0, 16.0, 64.0)  # powers of the smooth criteria, one run of L-BFGS each
-_BARRIERS = ((1e-3, 16.0), (1e-4, 64.0), (2e-5, 64.0))  # weight of the barrier, power of the criterion
 _MAP_POWER = 40.0
-_INSIDE = 0.999  # where the barrier starts, in parts of the limits
+_INSIDE = 0.99  # where the barrier starts, in parts of the limits
 _ITERATIONS = 150
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Schedule:
+    """How a criterion is approached.
+
+    powers : of the smooth criterion, one run of L-BFGS each
+    barriers : weight of the barrier in units of the criterion, and power of the criterion, one run of BFGS each
+    """
+
+    powers: tuple[float, ...]
+    barriers: tuple[tuple[float, float], ...]
+
+
+_SHARPENING = Schedule(powers=(4.0, 16.0), barriers=((1e-3, 16.0), (1e-4, 64.0), (2e-5, 64.0)))
+_FIXED = Schedule(powers=(1.0,), barriers=((3e-4, 1.0), (3e-5, 1.0)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,15 +63,19 @@ class Objective:
 
 def sharpened(criterion: Criterion, power: float) -> Criterion:
     """Return the criterion with another power of its p-norm; those without one stay."""
-    if isinstance(criterion, Mixed):
-        return Mixed(power=power, weight=criterion.weight)
-    if isinstance(criterion, ConditionNumber):
-        return ConditionNumber(power=power)
+    if isinstance(criterion, ConditionNumber | EOptimal | Mixed):
+        return replace(criterion, power=power)
     return criterion
 
 
 def polish(
-    information: Information, space: FourierSpace, start: FloatArray, *, criterion: Criterion, samples: int = SAMPLES
+    information: Information,
+    space: FourierSpace,
+    start: FloatArray,
+    *,
+    criterion: Criterion,
+    samples: int = SAMPLES,
+    guard: Guard | None = None,
 ) -> tuple[FloatArray, int]:
     """Return a better point inside the limits, and the number of evaluations it took.
 
@@ -62,19 +83,50 @@ def polish(
     ----------
     start : (n_v, 2 n_h - 1), inside or outside the limits
     samples : per period
+    guard : keeps limits of several joints at once, tightened where they were exceeded between the samples
     """
     objective = Objective(information=information, grid=space.grid(samples))
     rows = space.grid(LIMIT_SAMPLES).rows()
-    x, evaluations = start.reshape(space.shape), 0
-    for power in _SHARPNESS:
+    schedule = schedule_of(criterion)
+    x, evaluations = _INSIDE * space.shrunk(start), 0
+    for power in schedule.powers:
         x, count = _softly(objective, rows, x, sharpened(criterion, power))
         evaluations += count
-    inside, _ = soft_map(rows, x)
-    y = _INSIDE * space.shrunk(inside)
-    for weight, power in _BARRIERS:
-        y, count = _with_barrier(objective, rows, y, sharpened(criterion, power), weight=weight)
+    y = _INSIDE * space.shrunk(soft_map(rows, x)[0])
+    size = criterion.size(information.n)
+    stages = [(weight * size, sharpened(criterion, power)) for weight, power in schedule.barriers]
+    y, count = _with_barriers(objective, rows, _entered(objective, guard, y, stages[0][1]), stages, guard)
+    evaluations += count
+    if guard is None:
+        return space.shrunk(y), evaluations
+    if not guard.holds(y):
+        guard = guard.tightened(y)
+        y, count = _with_barriers(objective, rows, _entered(objective, guard, y, stages[-1][1]), stages[-1:], guard)
         evaluations += count
-    return space.shrunk(y), evaluations
+    return guard.settled(y), evaluations
+
+
+def schedule_of(criterion: Criterion) -> Schedule:
+    """Return how a criterion is approached: those with a power in steps, the others at once."""
+    return _FIXED if sharpened(criterion, 1.0) is criterion else _SHARPENING
+
+
+def _entered(objective: Objective, guard: Guard | None, y: FloatArray, criterion: Criterion) -> FloatArray:
+    """Return the point, or the best of those it becomes when shrunk towards each pose until it is inside the guard."""
+    if guard is None:
+        return y
+    return min(guard.starts(y), key=lambda point: objective.at(point, criterion)[0])
+
+
+def _with_barriers(
+    objective: Objective, rows: FloatArray, y: FloatArray, stages: list[tuple[float, Criterion]], guard: Guard | None
+) -> tuple[FloatArray, int]:
+    evaluations = 0
+    for weight, criterion in stages:
+        barrier = Barrier(rows=rows, weight=weight, guard=guard)
+        y, count = descend(partial(objective.at, criterion=criterion), barrier, y, iterations=_ITERATIONS)
+        evaluations += count
+    return y, evaluations
 
 
 def soft_map(rows: FloatArray, x: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
@@ -104,37 +156,3 @@ def _softly(objective: Objective, rows: FloatArray, x: FloatArray, criterion: Cr
     options = {"maxiter": _ITERATIONS, "maxcor": 30}
     found = minimize(mapped, x.ravel(), jac=True, method="L-BFGS-B", options=options)
     return np.asarray(found.x).reshape(x.shape), int(found.nfev)
-
-
-def _with_barrier(
-    objective: Objective, rows: FloatArray, y: FloatArray, criterion: Criterion, *, weight: float
-) -> tuple[FloatArray, int]:
-    from scipy.optimize import minimize
-
-    def guarded(flat: FloatArray) -> tuple[float, FloatArray]:
-        point = flat.reshape(y.shape)
-        used = np.einsum("jrk,jk->jr", rows, point)
-        if np.abs(used).max() >= 1.0:
-            return np.inf, np.zeros_like(flat)
-        value, gradient = objective.at(point, criterion)
-        room = 1.0 - used**2
-        gradient = gradient + weight * np.einsum("jrk,jr->jk", rows, 2.0 * used / room)
-        return value - weight * float(np.log(room).sum()), gradient.ravel()
-
-    options = {"maxiter": _ITERATIONS, "hess_inv0": _inverse_barrier_hessian(rows, y)}
-    found = minimize(guarded, y.ravel(), jac=True, method="BFGS", options=options)
-    return np.asarray(found.x).reshape(y.shape), int(found.nfev)
-
-
-def _inverse_barrier_hessian(rows: FloatArray, y: FloatArray) -> FloatArray:
-    """Return a first guess of the inverse Hessian, block by joint: the barrier's own, with a floor."""
-    used = np.einsum("jrk,jk->jr", rows, y)
-    bend = 2.0 * (1.0 + used**2) / (1.0 - used**2) ** 2
-    size = y.shape[1]
-    blocks = np.einsum("jrk,jr,jrl->jkl", rows, bend, rows)
-    floor = 0.05 * np.trace(blocks, axis1=1, axis2=2).sum() / y.size
-    whole = np.zeros((y.size, y.size))
-    for joint, block in enumerate(blocks):
-        part = slice(joint * size, (joint + 1) * size)
-        whole[part, part] = np.linalg.solve(block + floor * np.eye(size), np.eye(size))
-    return 0.5 * (whole + whole.T) * 1e3

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray, frozen, read_only
-from tauhat.dynamics.base import base_parameters, random_motion
+from tauhat.dynamics.base import base_parameters, independent_among, random_motion
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.dynamics.motion import Motion, MotionGradient
+from tauhat.dynamics.terms import INERTIAL_SYMBOLS
 from tauhat.errors import ExcitationError
 from tauhat.excitation.criteria import Criterion
 
@@ -27,6 +28,7 @@ class Information:
     columns : (n,) indices of the base parameters that count
     scales : (n,) RMS of each column over the equations of random states in the limits; a motion cannot change them
     weights : (n_v,) of the joints, one over the torque noise
+    prior : (n, n) scaled information that other motions already gave, added to every motion's own; zeros for none
     """
 
     model: TorqueModel
@@ -34,6 +36,10 @@ class Information:
     scales: FloatArray
     weights: FloatArray
     layout: Layout
+    prior: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "prior", frozen("prior information", self.prior, (self.n, self.n)))
 
     @property
     def n(self) -> int:
@@ -41,7 +47,7 @@ class Information:
         return int(self.columns.size)
 
     def matrix(self, motion: Motion) -> FloatArray:
-        """Return `M = (1/N) sum_j w_j^2 A_j'A_j` with scaled columns, (n, n)."""
+        """Return `M = (1/N) sum_j w_j^2 A_j'A_j + prior` with scaled columns, (n, n)."""
         return self._matrix(self._rows(motion), motion.n_t)
 
     def matrices(self, motion: Motion, count: int) -> FloatArray:
@@ -51,7 +57,7 @@ class Information:
         for joint, place in enumerate(self._places()):
             part = rows[self.layout.of_joint(joint)].transpose(1, 0, 2)
             matrices[:, place[:, None], place] += part @ part.transpose(0, 2, 1)
-        return matrices / (motion.n_t // count)
+        return np.asarray(matrices / (motion.n_t // count) + self.prior)
 
     def evaluate(self, motion: Motion, criterion: Criterion) -> tuple[float, MotionGradient]:
         """Return a criterion of the motion and its gradient with respect to q, dq, ddq, (n_v, n_t) each."""
@@ -73,7 +79,7 @@ class Information:
         for joint, place in enumerate(self._places()):
             part = rows[self.layout.of_joint(joint)]
             matrix[np.ix_(place, place)] += part @ part.T
-        return matrix / n_t
+        return np.asarray(matrix / n_t + self.prior)
 
     def _places(self) -> list[IntArray]:
         position = np.full(self.model.n_p, -1)
@@ -103,15 +109,23 @@ def information(
     ExcitationError
         when no column is left, or a noise is not positive.
     """
-    wanted = set(terms) or {term.key for term in model.terms}
-    owner = [term.key for term in model.terms for _ in term.parameters(model.robot)]
-    base = base_parameters(model)
-    columns = np.array([index for index in base.independent if owner[index] in wanted], dtype=np.intp)
-    if not columns.size:
-        raise ExcitationError("no column of the model is among the terms asked for", got=", ".join(sorted(wanted)))
-    noise = frozen(
-        "torque_noise", np.ones(model.robot.n_v) if torque_noise is None else torque_noise, (model.robot.n_v,)
-    )
+    return _information(model, _columns(model, set(terms)), torque_noise)
+
+
+def payload_information(model: TorqueModel, *, torque_noise: FloatArray | None = None) -> Information:
+    """Return what counts for a payload: the inertial columns of the last link that can be told from each other.
+
+    Raises
+    ------
+    ExcitationError
+        when the model has no such column, or a noise is not positive.
+    """
+    return _information(model, _payload_columns(model), torque_noise)
+
+
+def _information(model: TorqueModel, columns: IntArray, torque_noise: FloatArray | None) -> Information:
+    n_v = model.robot.n_v
+    noise = frozen("torque_noise", np.ones(n_v) if torque_noise is None else torque_noise, (n_v,))
     if not (noise > 0).all():
         raise ExcitationError("torque noise must be positive", got=noise.tolist())
     layout = model.layout(columns)
@@ -121,7 +135,64 @@ def information(
         scales=read_only(_scales(model, layout, columns)),
         weights=read_only(1.0 / noise),
         layout=layout,
+        prior=np.zeros((columns.size, columns.size)),
     )
+
+
+def after_motions(facts: Information, motions: Iterable[Motion]) -> Information:
+    """Return the same columns with what equally long motions already told about them."""
+    prior = sum((facts.matrix(motion) - facts.prior for motion in motions), start=facts.prior)
+    return replace(facts, prior=prior)
+
+
+def after_evidence(
+    facts: Information, *, columns: IntArray, covariance: FloatArray, torque_noise: FloatArray, rows: float
+) -> Information:
+    """Return the same columns with what an estimate already knows about them, and joints weighted by its residuals.
+
+    Parameters
+    ----------
+    columns : (n,) which parameters the covariance is of, `estimate.base.independent`
+    covariance : (n, n) `estimate.covariance`
+    torque_noise : (n_v,) `estimate.joint_rms` [Nm or N]
+    rows : independent rows that the motion to design will give, e.g. twice the cut-off times its length
+
+    Raises
+    ------
+    ExcitationError
+        when the estimate is of another model, or a noise is not positive.
+    """
+    if not np.array_equal(facts.columns, columns):
+        raise ExcitationError(
+            "the estimate is of another model than the motion is designed for",
+            where=facts.model.robot.name, remedy="give the same robot and --model as for identify",
+        )  # fmt: skip
+    if not ((torque_noise > 0).all() and rows > 0):
+        raise ExcitationError("torque noise and rows must be positive", got=f"{torque_noise.tolist()}, {rows}")
+    known = np.linalg.pinv(covariance * np.outer(facts.scales, facts.scales), hermitian=True)
+    return replace(facts, weights=read_only(1.0 / torque_noise), prior=0.5 * (known + known.T) / rows)
+
+
+def _columns(model: TorqueModel, wanted: set[str]) -> IntArray:
+    owner = [term.key for term in model.terms for _ in term.parameters(model.robot)]
+    kept = wanted or set(owner)
+    columns = np.array([index for index in base_parameters(model).independent if owner[index] in kept], dtype=np.intp)
+    if not columns.size:
+        raise ExcitationError("no column of the model is among the terms asked for", got=", ".join(sorted(kept)))
+    return columns
+
+
+def _payload_columns(model: TorqueModel) -> IntArray:
+    last = model.robot.n_v - 1
+    wanted = [
+        index
+        for index, parameter in enumerate(model.parameters)
+        if parameter.joint == last and parameter.symbol in INERTIAL_SYMBOLS
+    ]
+    columns = independent_among(model, np.array(wanted, dtype=np.intp))
+    if not columns.size:
+        raise ExcitationError("the model has no inertia of a last link to carry a payload", where=model.robot.name)
+    return columns
 
 
 def _scales(model: TorqueModel, layout: Layout, columns: IntArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """The space that motions are searched in: free Fourier coefficients and offsets, in which joint limits are linear.
 
 A point is `x` (n_v, 2 n_h - 1): the free coefficients of each joint and how far its offset is from the middle of its
-range. Position, velocity and acceleration over their limits are linear in x, so every joint limit is `|r| <= 1`,
+range. Position, velocity, acceleration and jerk over their limits are linear in x, so every joint limit is `|r| <= 1`,
 `r = R x`. The gauge of a joint is the largest |r| along its motion: a point divided by its gauge lies on the limits.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.motion import Motion, MotionGradient
-from tauhat.excitation.fourier import FourierSeries, fourier_basis, rest_basis
+from tauhat.excitation.fourier import FourierSeries, fourier_basis, jerk_basis, rest_basis
 from tauhat.excitation.limits import MotionLimits
 
 
@@ -61,15 +61,16 @@ class FourierSpace:
 
     def gauge(self, x: FloatArray) -> FloatArray:
         """Return how much of its limits each joint uses at any time, (n_v,); above one they are exceeded."""
-        hull = self.series(x).envelope()
-        parts = np.array(
-            [
-                np.maximum(hull.upper - self.middle, self.middle - hull.lower) / self.reach,
-                hull.velocity / self.limits.velocity,
-                hull.acceleration / self.limits.acceleration,
-            ]
-        )
-        return np.asarray(parts.max(axis=0))
+        series = self.series(x)
+        hull = series.envelope()
+        parts = [
+            np.maximum(hull.upper - self.middle, self.middle - hull.lower) / self.reach,
+            hull.velocity / self.limits.velocity,
+            hull.acceleration / self.limits.acceleration,
+        ]
+        if self.limits.jerk is not None:
+            parts.append(series.largest_jerk() / self.limits.jerk)
+        return np.asarray(np.max(parts, axis=0))
 
     def shrunk(self, x: FloatArray) -> FloatArray:
         """Return the point with the joints that exceed a limit scaled back onto it, exactly and at all times."""
@@ -82,7 +83,8 @@ class FourierSpace:
         position, velocity, acceleration = (
             basis @ free for basis in fourier_basis(t, period=self.period, harmonics=self.harmonics)
         )
-        return SampledSpace(space=self, position=position, velocity=velocity, acceleration=acceleration)
+        jerk = jerk_basis(t, period=self.period, harmonics=self.harmonics) @ free
+        return SampledSpace(space=self, position=position, velocity=velocity, acceleration=acceleration, jerk=jerk)
 
 
 def random_points(space: FourierSpace, count: int, rng: np.random.Generator) -> FloatArray:
@@ -105,12 +107,13 @@ def random_points(space: FourierSpace, count: int, rng: np.random.Generator) -> 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SampledSpace:
-    """A space on a grid of times: `(n_t, 2 n_h - 2)` maps from free coefficients to q, dq, ddq."""
+    """A space on a grid of times: `(n_t, 2 n_h - 2)` maps from free coefficients to q, dq, ddq and jerk."""
 
     space: FourierSpace
     position: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
+    jerk: FloatArray
 
     @property
     def n_t(self) -> int:
@@ -130,14 +133,21 @@ class SampledSpace:
         free = gradient.q @ self.position + gradient.dq @ self.velocity + gradient.ddq @ self.acceleration
         return np.column_stack([free, gradient.q.sum(axis=1)])
 
+    def pull_each(self, gradient: MotionGradient) -> FloatArray:
+        """Return the same sample by sample, (n_t, n_v (2 n_h - 1))."""
+        parts = zip(gradient, (self.position, self.velocity, self.acceleration), strict=True)
+        free = np.sum([np.einsum("jt,tk->tjk", bars, basis) for bars, basis in parts], axis=0)
+        return np.concatenate([free, gradient.q.T[:, :, None]], axis=2).reshape(self.n_t, -1)
+
     def rows(self) -> FloatArray:
-        """Return R, (n_v, 3 n_t, 2 n_h - 1): position, velocity and acceleration of each joint over its limits."""
+        """Return R, (n_v, n_r, 2 n_h - 1): position, velocity, acceleration, jerk of each joint over their limits."""
         ones, zeros = np.ones((self.n_t, 1)), np.zeros((self.n_t, 1))
-        maps = (
-            np.hstack([self.position, ones]),
-            np.hstack([self.velocity, zeros]),
-            np.hstack([self.acceleration, zeros]),
-        )
         limits = self.space.limits
-        sizes = (self.space.reach, limits.velocity, limits.acceleration)
-        return np.concatenate([rows / size[:, None, None] for rows, size in zip(maps, sizes, strict=True)], axis=1)
+        parts = [
+            (np.hstack([self.position, ones]), self.space.reach),
+            (np.hstack([self.velocity, zeros]), limits.velocity),
+            (np.hstack([self.acceleration, zeros]), limits.acceleration),
+        ]
+        if limits.jerk is not None:
+            parts.append((np.hstack([self.jerk, zeros]), limits.jerk))
+        return np.concatenate([rows / size[:, None, None] for rows, size in parts], axis=1)

@@ -1,6 +1,6 @@
 """The HTML report and its figures."""
 
-from tauhat.report.page import write_report
+from tauhat.report.page import write_motion_report, write_report
 from tauhat.report.thinning import thinned, thinned_cloud
 
-__all__ = ["thinned", "thinned_cloud", "write_report"]
+__all__ = ["thinned", "thinned_cloud", "write_motion_report", "write_report"]

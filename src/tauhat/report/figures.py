@@ -1,6 +1,6 @@
 """The report's drawings: Plotly figures as JSON, arrays as base64, colours and fonts left to the page.
 
-Names of joints and logs come from users, and Plotly reads text as a small HTML: every name passes `_plain` first.
+Names of joints and logs come from users, and Plotly reads text as a small HTML: every name passes `plain` first.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def torque_plot(log: LogPrediction, joint: int, *, key: str, most: int = MOST_PO
     figure.update_yaxes(title_text=f"{_effort(facts)} [{facts.unit}]", row=1, col=1)
     figure.update_yaxes(title_text=f"residual [{facts.unit}]", row=2, col=1)
     figure.update_xaxes(title_text=_time_title(log.t), row=2, col=1)
-    return _plot(figure, key=key, caption=facts.name, height=420)
+    return finished(figure, key=key, caption=facts.name, height=420)
 
 
 def speed_plot(log: LogPrediction, joint: int, *, key: str) -> Plot:
@@ -57,7 +57,7 @@ def speed_plot(log: LogPrediction, joint: int, *, key: str) -> Plot:
     figure = go.Figure()
     figure.add_trace(
         go.Scatter(
-            x=_compact(speed[shown]), y=_compact(error[shown]), mode="markers", name="samples",
+            x=compact(speed[shown]), y=compact(error[shown]), mode="markers", name="samples",
             marker={"color": RESIDUAL, "size": 3, "opacity": 0.4},
             hovertemplate="%{y:.3g} at %{x:.3g}<extra></extra>",
         )
@@ -73,7 +73,7 @@ def speed_plot(log: LogPrediction, joint: int, *, key: str) -> Plot:
     figure.update_xaxes(title_text=f"velocity [{_speed_unit(facts)}]")
     figure.update_yaxes(title_text=f"residual [{facts.unit}]")
     figure.update_layout(margin_t=34, showlegend=False)
-    return _plot(figure, key=key, caption=facts.name, height=290)
+    return finished(figure, key=key, caption=facts.name, height=290)
 
 
 def time_plot(log: LogPrediction, *, key: str) -> Plot:
@@ -86,14 +86,14 @@ def time_plot(log: LogPrediction, *, key: str) -> Plot:
         share = np.array([rms for _, rms in pairs]) / (torque[joint] if torque[joint] > 0 else np.inf)
         figure.add_trace(
             go.Scatter(
-                x=_compact(np.array([part.mean() for part, _ in pairs])), y=_compact(100 * share), mode="lines+markers",
-                name=_plain(facts.name), line={"color": _LINE_COLOURS[joint % len(_LINE_COLOURS)], "width": 2},
+                x=compact(np.array([part.mean() for part, _ in pairs])), y=compact(100 * share), mode="lines+markers",
+                name=plain(facts.name), line={"color": _LINE_COLOURS[joint % len(_LINE_COLOURS)], "width": 2},
                 hovertemplate="%{y:.3g} %",
             )
         )  # fmt: skip
     figure.update_xaxes(title_text=_time_title(log.t))
     figure.update_yaxes(title_text="rms residual [% of rms torque]", rangemode="tozero")
-    return _plot(figure, key=key, caption="all joints", height=340)
+    return finished(figure, key=key, caption="all joints", height=340)
 
 
 def parameter_plot(names: Sequence[str], relative: FloatArray, *, key: str) -> Plot:
@@ -113,39 +113,40 @@ def parameter_plot(names: Sequence[str], relative: FloatArray, *, key: str) -> P
     )
     for label, inside, colour in groups:
         members = np.flatnonzero(inside)
-        bars = {"type": "data", "array": _compact(100 * height[members]), "color": colour, "thickness": 2, "width": 3}
+        bars = {"type": "data", "array": compact(100 * height[members]), "color": colour, "thickness": 2, "width": 3}
         figure.add_trace(
             go.Scatter(
-                x=[_plain(names[int(k)]) for k in members], y=np.full(members.size, 100.0), mode="markers", name=label,
-                error_y=bars, marker={"color": colour, "size": 6}, customdata=_compact(100 * relative[members]),
+                x=[plain(names[int(k)]) for k in members], y=np.full(members.size, 100.0), mode="markers", name=label,
+                error_y=bars, marker={"color": colour, "size": 6}, customdata=compact(100 * relative[members]),
                 hovertemplate="%{x}: ± %{customdata:.3g} %<extra></extra>",
             )
         )  # fmt: skip
     n = len(names)
     figure.update_xaxes(
-        categoryorder="array", categoryarray=[_plain(name) for name in names], range=[-0.7, n - 0.3],
+        categoryorder="array", categoryarray=[plain(name) for name in names], range=[-0.7, n - 0.3],
         tickangle=-90, dtick=1, tickfont={"size": 11},
     )  # fmt: skip
     figure.update_yaxes(title_text="value and interval [% of the value]", range=[-60, 260], zerolinewidth=2)
     caption = "Every parameter over its own value, with its 95 % interval; the longest leave the drawing"
-    return _plot(figure, key=key, caption=caption, height=400, width=_WIDTH_PER_NAME * n)
+    return finished(figure, key=key, caption=caption, height=400, width=_WIDTH_PER_NAME * n)
 
 
 def _line(t: FloatArray, values: FloatArray, name: str, pen: tuple[str, float], most: int) -> Any:
     shown = thinned(values, most=most)
     x = _times(t, shown)
     return go.Scatter(
-        x=x, y=_compact(values[shown]), mode="lines", name=name, line={"color": pen[0], "width": pen[1]},
+        x=x, y=compact(values[shown]), mode="lines", name=name, line={"color": pen[0], "width": pen[1]},
         hovertemplate="%{y:.4g}",
     )  # fmt: skip
 
 
 def _times(t: FloatArray, shown: IntArray) -> NDArray[Any]:
     times = t[shown] - clock_start(t)
-    return _compact(times) if np.abs(times).max(initial=0.0) < _FLOAT32_SECONDS else times
+    return compact(times) if np.abs(times).max(initial=0.0) < _FLOAT32_SECONDS else times
 
 
-def _compact(values: FloatArray) -> NDArray[np.float32]:
+def compact(values: FloatArray) -> NDArray[np.float32]:
+    """Return the values as they are stored in the page."""
     return values.astype(np.float32)
 
 
@@ -170,11 +171,13 @@ def _time_title(t: FloatArray) -> str:
     return f"time − {start:.0f} s [s]" if start else "time [s]"
 
 
-def _plain(name: str) -> str:
+def plain(name: str) -> str:
+    """Return a name as text for Plotly, which would read it as HTML."""
     return escape(name)
 
 
-def _plot(figure: Any, *, key: str, caption: str, height: int, width: int = 0) -> Plot:
+def finished(figure: Any, *, key: str, caption: str, height: int, width: int = 0) -> Plot:
+    """Return the figure as a drawing of the page, without colours and fonts of its own."""
     top = figure.layout.margin.t or _LEGEND_AND_BUTTONS
     figure.update_layout(
         template=None, height=height, margin={"l": 64, "r": 16, "t": top, "b": 44}, hovermode="closest",

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from tauhat.dynamics.model import PLAIN_TERMS
 from tauhat.errors import MissingExtraError
 from tauhat.estimation.estimate import Estimate
+from tauhat.excitation.limits import MotionLimits
+from tauhat.excitation.trajectory import Trajectory
 from tauhat.files import write_text
 from tauhat.recordings.findings import Finding
+from tauhat.robots.robot import Robot
 from tauhat.verification.prediction import Verification
 
 if TYPE_CHECKING:
-    from tauhat.report.case import Case
+    from tauhat.report.case import Section
 
 Findings: TypeAlias = Sequence[Finding] | Mapping[str, Sequence[Finding]]
 
@@ -46,9 +50,47 @@ def write_report(
     for library in ("plotly", "jinja2"):
         _require(library)
     from tauhat.report.case import Case
+    from tauhat.report.sections import SECTIONS
 
     case = Case(estimate=estimate, verification=verification, findings=_by_log(findings))
-    write_text(path, _page(case, title or f"{estimate.robot.name}: identified torque model"))
+    heading = title or f"{estimate.robot.name}: identified torque model"
+    write_text(path, _page([section(case) for section in SECTIONS], title=heading, version=estimate.version))
+    return Path(path)
+
+
+def write_motion_report(
+    path: str | Path,
+    robot: Robot,
+    trajectory: Trajectory,
+    *,
+    terms: str | Iterable[str] = PLAIN_TERMS,
+    limits: MotionLimits | None = None,
+    margins: Mapping[str, float] | None = None,
+) -> Path:
+    """Write a self-contained HTML page about a motion and return its path: its limits, and what it identifies.
+
+    Parameters
+    ----------
+    terms : of the torque model whose parameters are judged
+    limits : of the joints; the robot's own by default
+    margins : unused parts of all limits, further ones too, as `Design.margins` has them
+
+    Raises
+    ------
+    MissingExtraError
+        when plotly or jinja2 is not installed.
+    OutputError
+        when the file cannot be written.
+    """
+    for library in ("plotly", "jinja2"):
+        _require(library)
+    from tauhat import __version__
+    from tauhat.report.motion_case import motion_case
+    from tauhat.report.sections import MOTION_SECTIONS
+
+    case = motion_case(robot, trajectory, terms=terms, limits=limits, margins=margins)
+    sections = [section(case) for section in MOTION_SECTIONS]
+    write_text(path, _page(sections, title=f"{robot.name}: designed motion", version=__version__))
     return Path(path)
 
 
@@ -67,14 +109,12 @@ def _require(library: str) -> None:
         raise MissingExtraError(library, "report") from error
 
 
-def _page(case: Case, title: str) -> str:
+def _page(sections: Sequence[Section], *, title: str, version: str) -> str:
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
 
     from tauhat.report.rendering import rendered, script_json
-    from tauhat.report.sections import SECTIONS
 
-    sections = [section(case) for section in SECTIONS]
     plots = [plot for section in sections for plot in section.plots]
     return rendered(
         "report.html.j2",
@@ -82,6 +122,6 @@ def _page(case: Case, title: str) -> str:
         sections=sections,
         data=[(plot.key, script_json(plot.json)) for plot in plots],
         plotly=Markup(get_plotlyjs()),  # noqa: S704 - the library's own source
-        version=case.estimate.version,
+        version=version,
         written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
     )

@@ -53,6 +53,22 @@ def rotation_about(axis: FloatArray, angle: FloatArray) -> FloatArray:
     return rotation
 
 
+def quaternion(rotation: FloatArray) -> FloatArray:
+    """Return the unit quaternion (w, x, y, z), w >= 0, of a rotation matrix.
+
+    The squares of its parts follow from the diagonal; the largest part gives the others without loss.
+    """
+    trace = float(np.trace(rotation))
+    squares = np.array([1.0 + trace, *(1.0 - trace + 2.0 * np.diag(rotation))])  # four times each part's square
+    sums, differences = rotation + rotation.T, rotation - rotation.T
+    turns = np.array([differences[2, 1], differences[0, 2], differences[1, 0]])
+    products = np.block([[squares[0], turns], [turns[:, None], sums]])
+    products[np.diag_indices(4)] = squares
+    row = products[int(np.argmax(squares))]
+    found = row / np.linalg.norm(row)
+    return np.asarray(found if found[0] >= 0.0 else -found)
+
+
 def joint_pose(joint: Joint, position: float) -> FloatArray:
     """Return the (4, 4) pose of the joint's link frame in its parent's joint frame at `position` [rad or m]."""
     placement = homogeneous(joint.rotation, joint.translation)

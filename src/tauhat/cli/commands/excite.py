@@ -11,12 +11,13 @@ import typer
 
 from tauhat.cli.options import TERM_NAMES, JsonOption, LockOption, ModelOption, RobotArgument, SeedOption
 from tauhat.cli.output import show, unbroken
-from tauhat.cli.reporting import searching
+from tauhat.cli.reporting import searching, working
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tauhat.excitation import Design
+    from tauhat.excitation import Design, DesignSettings
+    from tauhat.robots.robot import Robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +44,22 @@ class Options:
     margin: Annotated[
         float, typer.Option("--margin", min=0.0, max=0.9, help="Part of every joint limit that is left unused.")
     ] = 0.05
+    limits: Annotated[
+        Path | None,
+        typer.Option(
+            "--limits",
+            metavar="LIMITS.toml",
+            help="Torque, tool, collisions and obstacles to keep, and joint limits instead of the robot's.",
+            show_default=False,
+            readable=False,
+        ),
+    ] = None
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report", metavar="MOTION.html", help="Page about the motion to write as well.", show_default=False
+        ),
+    ] = None
     model: ModelOption = TERM_NAMES
     lock: LockOption = None
     seed: SeedOption = 0
@@ -50,10 +67,10 @@ class Options:
 
 
 def run(options: Options) -> None:
-    """Design a motion that identifies a robot well and keeps its joint limits at all times."""
+    """Design a motion that identifies a robot well and keeps its limits at all times."""
     import numpy as np
 
-    from tauhat.excitation import DesignSettings, criterion_named, design, method_named
+    from tauhat.excitation import DesignSettings, criterion_named, design, load_limits, method_named
     from tauhat.recordings.writing import write_recording
     from tauhat.robots.library import load_robot
 
@@ -64,6 +81,7 @@ def run(options: Options) -> None:
         method=method_named(options.method),
         starts=options.starts,
         margin=options.margin,
+        limits=None if options.limits is None else load_limits(options.limits, robot),
     )
     criterion = criterion_named(options.criterion)
     with searching(f"a motion for {robot.name}", settings.genetic.generations) as progress:
@@ -76,16 +94,29 @@ def run(options: Options) -> None:
             progress=progress,
         )
     write_recording(found.recording(rate=options.rate, joint_names=robot.joint_names), options.output)
+    if options.report is not None:
+        _write_page(options.report, settings, robot, found, terms=options.model)
     document = {"motion": str(options.output), "robot": robot.name, "seed": options.seed, **found.to_dict()}
-    show(document, lambda: _view(document, found), as_json=options.as_json)
+    distances = frozenset[str]() if settings.limits is None else settings.limits.distances
+    show(document, lambda: _view(document, found, distances), as_json=options.as_json)
 
 
-def _view(document: dict[str, Any], found: Design) -> Iterator[RenderableType]:
+def _write_page(path: Path, settings: DesignSettings, robot: Robot, found: Design, *, terms: str) -> None:
+    from tauhat.report.page import write_motion_report
+
+    limits = None if settings.limits is None else settings.limits.of_joints()
+    with working("drawing"):
+        write_motion_report(path, robot, found.trajectory, terms=terms, limits=limits, margins=found.margins)
+
+
+def _view(document: dict[str, Any], found: Design, distances: frozenset[str]) -> Iterator[RenderableType]:
     from tauhat.cli.views.tables import table
+    from tauhat.excitation import FAR
 
     made = table("Limits", ("limit",), ("left unused",))
     for name, margin in found.margins.items():
-        made.add_row(name, f"{100 * margin:.1f} %")
+        beyond = f"{1e3 * FAR * margin:.0f} mm{' or more' if margin >= 1.0 else ''} beyond the clearance"
+        made.add_row(name, beyond if name in distances else f"{100 * margin:.1f} %")
     yield (
         f"Condition number {found.condition:.2f} (columns scaled by constants; good: below 10), log det "
         f"{found.log_det:.1f}, found in {found.seconds:.1f} s with {found.evaluations} evaluations."

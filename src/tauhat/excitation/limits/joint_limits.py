@@ -23,20 +23,26 @@ class MotionLimits:
     lower, upper : position [rad or m]
     velocity : largest speed [rad/s or m/s]
     acceleration : largest acceleration [rad/s^2 or m/s^2]
+    jerk : largest change of acceleration [rad/s^3 or m/s^3], None where there is no limit
     """
 
     lower: FloatArray
     upper: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
+    jerk: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n_v = np.size(self.lower)
         for name in ("lower", "upper", "velocity", "acceleration"):
             object.__setattr__(self, name, frozen(name, getattr(self, name), (n_v,), where="motion limits"))
+        if self.jerk is not None:
+            object.__setattr__(self, "jerk", frozen("jerk", self.jerk, (n_v,), where="motion limits"))
+            if not (self.jerk > 0.0).all():
+                raise ExcitationError("a jerk limit must be positive", got=self.jerk.tolist())
 
 
-def motion_limits(robot: Robot, *, margin: float = 0.0) -> MotionLimits:
+def motion_limits(robot: Robot, *, margin: float = 0.0, jerk: FloatArray | None = None) -> MotionLimits:
     """Return the robot's limits drawn in by `margin`, completed where the robot states none.
 
     A joint without position limits gets +-pi rad (+-0.5 m) about zero, or twice that from its only limit; without a
@@ -45,6 +51,7 @@ def motion_limits(robot: Robot, *, margin: float = 0.0) -> MotionLimits:
     Parameters
     ----------
     margin : fraction of each limit left unused, in [0, 1); of the half range for positions
+    jerk : (n_v,) [rad/s^3 or m/s^3]; unlimited by default
 
     Raises
     ------
@@ -58,7 +65,11 @@ def motion_limits(robot: Robot, *, margin: float = 0.0) -> MotionLimits:
     inset = 0.5 * margin * (upper - lower)
     used = 1.0 - margin
     return MotionLimits(
-        lower=lower + inset, upper=upper - inset, velocity=used * velocity, acceleration=used * acceleration
+        lower=lower + inset,
+        upper=upper - inset,
+        velocity=used * velocity,
+        acceleration=used * acceleration,
+        jerk=None if jerk is None else used * jerk,
     )
 
 

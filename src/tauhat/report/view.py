@@ -1,0 +1,137 @@
+"""An arm running a motion in the browser: viser serves it on this machine alone."""
+
+from __future__ import annotations
+
+import time
+from contextlib import redirect_stdout
+from io import StringIO
+from typing import Any
+
+import numpy as np
+
+from tauhat.arrays import FloatArray
+from tauhat.errors import MissingExtraError, OutputError
+from tauhat.report.replay import Replay
+from tauhat.robots.transforms import quaternion
+
+HOST = "127.0.0.1"
+_FRAMES_PER_SECOND = 30.0
+_BARS_PER_SECOND = 8.0
+_LINKS = ((125, 176, 238), (95, 108, 128))
+_JOINTS = (217, 101, 27)
+
+
+class Viewer:
+    """A running view of a motion: the scene, its controls, and the time that is shown."""
+
+    def __init__(self, replay: Replay, *, port: int) -> None:
+        self._replay = replay
+        self.server = _server(port)
+        self._frames = _scene(self.server.scene, replay)
+        self._server_looks_at(replay.reach)
+        gui = self.server.gui
+        gui.configure_theme(show_share_button=False, show_logo=False)
+        gui.main_panel.dock_right()
+        self._play = gui.add_checkbox("Play", initial_value=True)
+        self._time = gui.add_slider("Time (s)", 0.0, max(replay.duration, 1e-3), 1e-3, 0.0)
+        self._speed = gui.add_slider("Speed", 0.05, 3.0, 0.05, 1.0)
+        with gui.add_folder("Used part of the limits"):
+            self._bars = gui.add_html(replay.margins(0))
+        self._shown = 0.0
+        self._bars_due = 0.0
+        self.show(0.0)
+
+    @property
+    def url(self) -> str:
+        """Where the browser finds it."""
+        return f"http://{HOST}:{self.server.get_port()}"
+
+    def show(self, moment: float) -> None:
+        """Put the arm where it is at a time of the motion [s]."""
+        index, poses = self._replay.index(moment), self._replay.poses
+        with self.server.atomic():
+            for link, frame in enumerate(self._frames):
+                frame.wxyz = quaternion(poses.rotation[link, index])
+                frame.position = poses.origin[link, index]
+        now = time.monotonic()
+        if now >= self._bars_due:
+            self._bars.content = self._replay.margins(index)
+            self._bars_due = now + 1.0 / _BARS_PER_SECOND
+
+    def step(self, elapsed: float) -> None:
+        """Move on by `elapsed` seconds at the chosen speed, or to where the reader dragged the time."""
+        dragged = self._time.value
+        if self._play.value and abs(dragged - self._shown) < 2e-3:
+            after = dragged + elapsed * self._speed.value
+            self._time.value = dragged = after % self._replay.duration if self._replay.duration > 0 else 0.0
+        self._shown = dragged
+        self.show(dragged)
+
+    def run(self) -> None:
+        """Run until the process is interrupted."""
+        last = time.monotonic()
+        try:
+            while True:
+                time.sleep(1.0 / _FRAMES_PER_SECOND)
+                now = time.monotonic()
+                self.step(now - last)
+                last = now
+        finally:
+            self.stop()
+
+    def stop(self) -> None:
+        """Close the server."""
+        with redirect_stdout(StringIO()):
+            self.server.stop()
+
+    def _server_looks_at(self, reach: float) -> None:
+        camera = self.server.initial_camera
+        camera.position = (1.4 * reach, 1.1 * reach, 1.0 * reach)
+        camera.look_at = (0.0, 0.0, 0.1 * reach)
+
+
+def _server(port: int) -> Any:
+    try:
+        import viser
+    except ImportError as error:
+        raise MissingExtraError("viser", "view") from error
+    try:
+        with redirect_stdout(StringIO()):  # viser greets on standard output
+            return viser.ViserServer(host=HOST, port=port, label="tauhat", verbose=False)
+    except (OSError, OverflowError) as error:
+        raise OutputError("the port cannot be used", got=port, remedy="choose another with --port") from error
+
+
+def _scene(scene: Any, replay: Replay) -> list[Any]:
+    """Build floor, links and joints; return the frame of each link."""
+    robot, reach = replay.body.robot, replay.reach
+    size = 0.25 if reach > 0.5 else 0.05
+    scene.set_up_direction("+z")
+    scene.add_grid("/floor", width=4.0 * reach, height=4.0 * reach, cell_size=size, section_size=4 * size)
+    scene.add_frame("/base", axes_length=0.15 * reach, axes_radius=0.006 * reach)
+    frames = [scene.add_frame(f"/links/{index}", show_axes=False) for index in range(robot.n_v)]
+    for index, capsule in enumerate(replay.body.capsules):
+        place = f"/links/{capsule.link}/{index}" if capsule.link >= 0 else f"/base/{index}"
+        colour = _LINKS[capsule.link % len(_LINKS)]
+        middle, wxyz = 0.5 * (capsule.start + capsule.end), _along(capsule.end - capsule.start)
+        radius = 0.8 * capsule.radius
+        scene.add_cylinder(
+            f"{place}/bar", radius=radius, height=capsule.length, color=colour, position=middle, wxyz=wxyz
+        )
+        for end, point in (("start", capsule.start), ("end", capsule.end)):
+            scene.add_icosphere(f"{place}/{end}", radius=radius, color=colour, position=point)
+    for index, joint in enumerate(robot.joints):
+        radius = 0.9 * max(capsule.radius for capsule in replay.body.capsules)
+        scene.add_cylinder(
+            f"/links/{index}/joint", radius=radius, height=2.2 * radius, color=_JOINTS, wxyz=_along(joint.axis)
+        )
+    return frames
+
+
+def _along(direction: FloatArray) -> FloatArray:
+    """Return the quaternion (w, x, y, z) of a rotation that takes z to a direction."""
+    z = direction / np.linalg.norm(direction)
+    helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return quaternion(np.column_stack([x, np.cross(z, x), z]))
