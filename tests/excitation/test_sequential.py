@@ -10,7 +10,7 @@ from tauhat.errors import ExcitationError
 from tauhat.excitation import FourierSpace, motion_limits, random_points
 from tauhat.excitation.criteria import ConditionNumber, DOptimal
 from tauhat.excitation.gradient import polish
-from tauhat.excitation.information import after_evidence, after_motions, information, payload_information
+from tauhat.excitation.information import Knowledge, after_evidence, after_motions, information, payload_information
 from tauhat.robots import load_robot
 
 
@@ -35,7 +35,8 @@ def test_covariance_of_an_estimate_is_information_of_its_rows():
     weighted = information(facts.model, torque_noise=noise)
     unscaled = weighted.matrix(motion) * np.outer(facts.scales, facts.scales)
     covariance = np.linalg.inv(200 * unscaled)
-    after = after_evidence(facts, columns=facts.columns, covariance=covariance, torque_noise=noise, rows=200.0)
+    known = Knowledge(columns=facts.columns, covariance=covariance, torque_noise=noise, rows_per_second=40.0)
+    after = after_evidence(facts, known, seconds=5.0)
     assert np.allclose(after.prior, weighted.matrix(motion), rtol=1e-6)
     assert np.allclose(after.matrix(motion), 2 * weighted.matrix(motion), rtol=1e-6)
 
@@ -69,7 +70,12 @@ def test_prior_enters_the_gradient():
 def test_an_estimate_of_another_model_is_refused():
     facts = information(torque_model(load_robot("two_link"), "inertia"))
     with pytest.raises(ExcitationError, match="estimate is of another model"):
-        after_evidence(facts, columns=np.array([0]), covariance=np.eye(1), torque_noise=np.ones(2), rows=10.0)
+        after_evidence(
+            facts, Knowledge(columns=np.array([0]), covariance=np.eye(1), torque_noise=np.ones(2), rows_per_second=1.0),
+            seconds=10.0,
+        )  # fmt: skip
+    with pytest.raises(ExcitationError, match="must be positive"):
+        Knowledge(columns=np.array([0]), covariance=np.eye(1), torque_noise=np.zeros(2), rows_per_second=1.0)
 
 
 def test_a_payload_motion_sees_all_ten_parameters_of_the_last_link():

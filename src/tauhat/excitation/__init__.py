@@ -13,7 +13,14 @@ from tauhat.excitation.criteria import (
 from tauhat.excitation.design import METHODS, Design, DesignSettings, Method, design, limit_margins, method_named
 from tauhat.excitation.fourier import FourierSeries, fourier_basis, random_fourier, rest_basis
 from tauhat.excitation.genetic import GeneticSettings
-from tauhat.excitation.information import Information, information
+from tauhat.excitation.information import (
+    Information,
+    Knowledge,
+    after_evidence,
+    after_motions,
+    information,
+    payload_information,
+)
 from tauhat.excitation.limits import (
     FAR,
     LimitSet,
@@ -41,6 +48,7 @@ __all__ = [
     "FourierSpace",
     "GeneticSettings",
     "Information",
+    "Knowledge",
     "LimitSet",
     "Method",
     "Mixed",
@@ -49,6 +57,8 @@ __all__ = [
     "MotionSamples",
     "SampledSpace",
     "Trajectory",
+    "after_evidence",
+    "after_motions",
     "criterion_named",
     "design",
     "fourier_basis",
@@ -58,6 +68,7 @@ __all__ = [
     "method_named",
     "motion_limits",
     "parse_limits",
+    "payload_information",
     "random_fourier",
     "random_points",
     "rest_basis",

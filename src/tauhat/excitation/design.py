@@ -19,7 +19,7 @@ from tauhat.excitation.fourier import FourierSeries
 from tauhat.excitation.genetic import GeneticSettings, Progress, evolve
 from tauhat.excitation.gradient import SAMPLES, polish
 from tauhat.excitation.guard import FINER, Guard
-from tauhat.excitation.information import SMOOTH_SIGN, Information, information
+from tauhat.excitation.information import SMOOTH_SIGN, Information, Knowledge, after_evidence, information
 from tauhat.excitation.limits import LimitSet, MotionLimits
 from tauhat.excitation.poses import guard_of
 from tauhat.excitation.space import FourierSpace, random_points
@@ -99,6 +99,7 @@ class DesignSettings:
     margin : part of every limit that is left unused
     genetic : settings of the genetic search
     limits : further limits than the robot's own, or others
+    after : what is already known: the motion is then designed for what is still uncertain
     """
 
     period: float = 10.0
@@ -108,6 +109,7 @@ class DesignSettings:
     margin: float = 0.05
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
     limits: LimitSet | None = None
+    after: Knowledge | None = None
 
     def __post_init__(self) -> None:
         method_named(self.method)
@@ -148,6 +150,8 @@ def design(
     of_joints = limits.of_joints(margin=wanted.margin)
     space = FourierSpace(limits=of_joints, period=wanted.period, harmonics=wanted.harmonics)
     facts = information(_smooth(torque_model(limits.robot, terms), of_joints))
+    if wanted.after is not None:
+        facts = after_evidence(facts, wanted.after, seconds=wanted.period)
     guard = None
     if limits.others:
         guard = guard_of(space, limits, margin=wanted.margin, samples=SAMPLES, rng=rng)

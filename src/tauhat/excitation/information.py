@@ -145,32 +145,49 @@ def after_motions(facts: Information, motions: Iterable[Motion]) -> Information:
     return replace(facts, prior=prior)
 
 
-def after_evidence(
-    facts: Information, *, columns: IntArray, covariance: FloatArray, torque_noise: FloatArray, rows: float
-) -> Information:
-    """Return the same columns with what an estimate already knows about them, and joints weighted by its residuals.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Knowledge:
+    """What an estimate already knows, for the motion that comes after it.
 
-    Parameters
-    ----------
     columns : (n,) which parameters the covariance is of, `estimate.base.independent`
     covariance : (n, n) `estimate.covariance`
     torque_noise : (n_v,) `estimate.joint_rms` [Nm or N]
-    rows : independent rows that the motion to design will give, e.g. twice the cut-off times its length
+    rows_per_second : independent rows that a second of motion gives, twice the low-pass of the estimate [1/s]
+    """
+
+    columns: IntArray
+    covariance: FloatArray
+    torque_noise: FloatArray
+    rows_per_second: float
+
+    def __post_init__(self) -> None:
+        n = np.size(self.columns)
+        object.__setattr__(self, "covariance", frozen("covariance", self.covariance, (n, n)))
+        object.__setattr__(self, "torque_noise", frozen("torque_noise", self.torque_noise, (None,)))
+        if not ((self.torque_noise > 0).all() and self.rows_per_second > 0):
+            raise ExcitationError("torque noise and rows must be positive", got=self.torque_noise.tolist())
+
+
+def after_evidence(facts: Information, known: Knowledge, *, seconds: float) -> Information:
+    """Return the same columns with what is already known about them, and joints weighted by the estimate's residuals.
+
+    Parameters
+    ----------
+    seconds : length of the motion to design
 
     Raises
     ------
     ExcitationError
-        when the estimate is of another model, or a noise is not positive.
+        when the estimate is of another model.
     """
-    if not np.array_equal(facts.columns, columns):
+    if not np.array_equal(facts.columns, known.columns):
         raise ExcitationError(
             "the estimate is of another model than the motion is designed for",
             where=facts.model.robot.name, remedy="give the same robot and --model as for identify",
         )  # fmt: skip
-    if not ((torque_noise > 0).all() and rows > 0):
-        raise ExcitationError("torque noise and rows must be positive", got=f"{torque_noise.tolist()}, {rows}")
-    known = np.linalg.pinv(covariance * np.outer(facts.scales, facts.scales), hermitian=True)
-    return replace(facts, weights=read_only(1.0 / torque_noise), prior=0.5 * (known + known.T) / rows)
+    told = np.linalg.pinv(known.covariance * np.outer(facts.scales, facts.scales), hermitian=True)
+    rows = seconds * known.rows_per_second
+    return replace(facts, weights=read_only(1.0 / known.torque_noise), prior=0.5 * (told + told.T) / rows)
 
 
 def _columns(model: TorqueModel, wanted: set[str]) -> IntArray:

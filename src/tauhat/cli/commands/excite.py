@@ -16,7 +16,7 @@ from tauhat.cli.reporting import searching, working
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tauhat.excitation import Design, DesignSettings
+    from tauhat.excitation import Design, DesignSettings, Knowledge
     from tauhat.robots.robot import Robot
 
 
@@ -60,6 +60,12 @@ class Options:
             "--report", metavar="MOTION.html", help="Page about the motion to write as well.", show_default=False
         ),
     ] = None
+    after: Annotated[
+        Path | None,
+        typer.Option(
+            "--after", metavar="ESTIMATE.json", help="Design for what this estimate is unsure of.", show_default=False
+        ),
+    ] = None
     model: ModelOption = TERM_NAMES
     lock: LockOption = None
     seed: SeedOption = 0
@@ -82,6 +88,7 @@ def run(options: Options) -> None:
         starts=options.starts,
         margin=options.margin,
         limits=None if options.limits is None else load_limits(options.limits, robot),
+        after=None if options.after is None else _knowledge(options.after, robot),
     )
     criterion = criterion_named(options.criterion)
     with searching(f"a motion for {robot.name}", settings.genetic.generations) as progress:
@@ -99,6 +106,20 @@ def run(options: Options) -> None:
     document = {"motion": str(options.output), "robot": robot.name, "seed": options.seed, **found.to_dict()}
     distances = frozenset[str]() if settings.limits is None else settings.limits.distances
     show(document, lambda: _view(document, found, distances), as_json=options.as_json)
+
+
+def _knowledge(path: Path, robot: Robot) -> Knowledge:
+    from tauhat.estimation.estimate import load_estimate
+    from tauhat.excitation import Knowledge
+
+    estimate = load_estimate(path)
+    estimate.check_robot(robot)
+    return Knowledge(
+        columns=estimate.base.independent,
+        covariance=estimate.covariance,
+        torque_noise=estimate.joint_rms,
+        rows_per_second=2.0 * estimate.processing.cutoff,
+    )
 
 
 def _write_page(path: Path, settings: DesignSettings, robot: Robot, found: Design, *, terms: str) -> None:
