@@ -173,14 +173,6 @@ def test_many_recordings_keep_the_number_of_blocks_bounded():
     assert many.recordings == ("run 0", "run 1", "run 2", "run 3") * 3
 
 
-def test_leaving_a_block_out_leaves_its_rows_out():
-    less = evidence(0).without(3)
-    assert less.n_t == evidence(0).n_t - evidence(0).blocks[3].n_t
-    together = less.total.merged(evidence(0).blocks[3])
-    for ours, whole in zip(together.factors, evidence(0).total.factors, strict=True):
-        assert np.allclose(ours.T @ ours, whole.T @ whole, rtol=0, atol=1e-9 * np.abs(whole.T @ whole).max())
-
-
 def test_evidence_of_different_models_is_not_merged():
     other = torque_model(truth().model.robot, "inertia,viscous")
     foreign = collect(other, base_parameters(other), recording(0), SETTINGS)

@@ -114,10 +114,6 @@ class Evidence:
         """Return the blocks of time with neighbours merged until there are at most `most`."""
         return _at_most(self.blocks, most)
 
-    def without(self, block: int) -> Evidence:
-        """Return the evidence without one block of time."""
-        return replace(self, blocks=self.blocks[:block] + self.blocks[block + 1 :])
-
 
 def _together(blocks: tuple[Block, ...]) -> Block:
     stacked = (np.vstack(factors) for factors in zip(*(block.factors for block in blocks), strict=True))

@@ -47,8 +47,7 @@ def write_report(
     OutputError
         when the file cannot be written.
     """
-    for library in ("plotly", "jinja2"):
-        _require(library)
+    _require_libraries()
     from tauhat.report.case import Case
     from tauhat.report.sections import SECTIONS
 
@@ -82,8 +81,7 @@ def write_motion_report(
     OutputError
         when the file cannot be written.
     """
-    for library in ("plotly", "jinja2"):
-        _require(library)
+    _require_libraries()
     from tauhat import __version__
     from tauhat.report.motion_case import motion_case
     from tauhat.report.sections import MOTION_SECTIONS
@@ -102,11 +100,12 @@ def _by_log(findings: Findings | None) -> tuple[tuple[str, tuple[Finding, ...]],
     return (("", tuple(findings)),)
 
 
-def _require(library: str) -> None:
-    try:
-        importlib.import_module(library)
-    except ImportError as error:
-        raise MissingExtraError(library, "report") from error
+def _require_libraries() -> None:
+    for library in ("plotly", "jinja2"):
+        try:
+            importlib.import_module(library)
+        except ImportError as error:
+            raise MissingExtraError(library, "report") from error
 
 
 def _page(sections: Sequence[Section], *, title: str, version: str) -> str:
