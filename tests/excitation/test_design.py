@@ -69,11 +69,12 @@ def test_motion_and_pullback_of_the_grid_are_transposes():
 
 def test_soft_map_stays_inside_and_its_gradient_is_that_of_finite_differences():
     where = space(two_link())
-    rows, rng = where.grid(50).rows(), np.random.default_rng(3)
+    grid, rng = where.grid(50), np.random.default_rng(3)
+    rows, rest = grid.rows(), grid.rest()
     x, direction, weight = rng.normal(size=(3, *where.shape))
-    image, pull = soft_map(rows, 3.0 * x)
+    image, pull = soft_map(rows, rest, 3.0 * x)
     assert np.abs(np.einsum("jrk,jk->jr", rows, image)).max() < 1.0
-    ahead, behind = (soft_map(rows, 3.0 * x + sign * 1e-6 * direction)[0] for sign in (1, -1))
+    ahead, behind = (soft_map(rows, rest, 3.0 * x + sign * 1e-6 * direction)[0] for sign in (1, -1))
     expected = (weight * (ahead - behind)).sum() / 2e-6
     assert (pull(weight) * direction).sum() == pytest.approx(expected, rel=1e-5)
 

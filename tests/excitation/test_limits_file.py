@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import pytest
 
 from tauhat.dynamics.motion import motion_from_rows
-from tauhat.errors import ExcitationError, TauhatWarning
+from tauhat.errors import ExcitationError
 from tauhat.excitation import DesignSettings, GeneticSettings, design, load_limits, parse_limits
 from tauhat.excitation.limits import LimitSet
 from tauhat.robots import Robot, load_robot
@@ -95,7 +93,8 @@ def test_a_design_keeps_everything_in_the_file_on_the_fine_grid(tmp_path, method
     assert all(margin >= (0.1 if name in relative else 0.0) - 1e-12 for name, margin in margins.items()), margins
     assert {name: found.margins[name] for name in margins} == pytest.approx(margins, abs=1e-9)
     assert min(found.margins[name] for name in ("position", "velocity", "acceleration", "jerk")) >= 0.1 - 1e-9
-    assert min(smallest_margins(found, limits, 20_011).values()) > -1e-3
+    finer = smallest_margins(found, limits, 20_011)
+    assert all(margin >= (0.1 if name in relative else 0.0) - 1e-9 for name, margin in finer.items()), finer
 
 
 def test_genetic_design_alone_keeps_further_limits_and_its_seed_decides():
@@ -179,6 +178,7 @@ def test_a_file_that_is_none_is_refused(tmp_path):
     [
         ("[tool]\nlower = [2, -1, -1]\nupper = [3, 1, 1]", "tool box: no pose keeps the limit; got lowest x of"),
         ("[torque]\nlargest = [2.0, 0.5]", "torque: no pose keeps the limit; got joint joint_2: 0.6"),
+        ("[torque]\nlargest = [2.0, 0.5]", "gravity and friction alone need that in the best pose"),
         ("[[planes]]\nname = 'floor'\noffset = 1.5", "floor: no pose keeps the limit"),
         ("[[boxes]]\nname = 'block'\nsize = [3, 3, 3]", "block: no pose keeps the limit"),
         ("home = [0, 0]\n[[boxes]]\nname = 'crate'\nsize = [1, 1, 1]\nxyz = [0.8, 0, 0]",
@@ -193,52 +193,3 @@ def test_limits_that_no_motion_keeps_are_named_with_the_reason(text, message):
     with pytest.raises(ExcitationError) as caught:
         design(two_link(), rng=np.random.default_rng(0), settings=DesignSettings(limits=limits))
     assert message in str(caught.value)
-
-
-def random_file(rng: np.random.Generator, robot: Robot) -> str:
-    """Return a limits file that is hard, but not absurd: some parts of it, at random."""
-    parts = []
-    row = lambda low, high: [round(float(x), 3) for x in rng.uniform(low, high, 3)]  # noqa: E731
-    if rng.random() < 0.5:
-        parts.append(f"[joints]\nlower = {rng.uniform(-3, 0.5):.3f}\nvelocity = {rng.uniform(0.1, 2):.3f}")
-    if rng.random() < 0.5:
-        parts.append(f"[torque]\nfraction = {rng.uniform(0.05, 1):.3f}")
-    if rng.random() < 0.6:
-        low = np.array(row(-0.6, 0.4))
-        parts.append(f"[tool]\nlower = {low.tolist()}\nupper = {(low + row(0.02, 0.9)).tolist()}")
-        parts.append(f"speed = {rng.uniform(0.02, 1):.3f}")
-    if rng.random() < 0.5:
-        parts.append(f"[collision]\nclearance = {rng.uniform(0, 0.1):.3f}\nradius = {rng.uniform(0.02, 0.15):.3f}")
-    if rng.random() < 0.5:
-        parts.append(f"[[planes]]\nname = 'wall'\nnormal = {row(-1, 1)}\noffset = {rng.uniform(-0.7, 0.2):.3f}")
-    parts.extend(
-        f"[[boxes]]\nname = 'box {number}'\nsize = {row(0.05, 0.6)}\nxyz = {row(-0.8, 0.8)}\nrpy = {row(-3, 3)}"
-        for number in range(int(rng.integers(0, 3)))
-    )
-    return "\n".join(parts)
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_random_limit_files_give_a_feasible_motion_or_a_named_reason(seed):
-    rng = np.random.default_rng(seed)
-    robot = load_robot(["two_link", "crs_a465", "ur5e"][seed % 3])
-    settings = {
-        "harmonics": 2,
-        "period": 4.0,
-        "method": "genetic",
-        "genetic": GeneticSettings(population=8, generations=2),
-    }
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TauhatWarning)
-        limits = parse_limits(random_file(rng, robot), robot)
-    try:
-        found = design(robot, rng=rng, settings=DesignSettings(limits=limits, **settings))
-    except ExcitationError as error:
-        reason = str(error)
-    else:
-        reason = ""
-    if reason:
-        assert any(reason.startswith(limit.name) for limit in limits.others), reason
-        return
-    assert min(smallest_margins(found, limits).values(), default=0.0) >= -1e-12
-    assert min(found.margins.values()) >= -1e-12

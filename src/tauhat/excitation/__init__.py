@@ -20,6 +20,7 @@ from tauhat.excitation.information import (
     after_motions,
     information,
     payload_information,
+    with_exact_sign,
 )
 from tauhat.excitation.limits import (
     FAR,
@@ -30,6 +31,8 @@ from tauhat.excitation.limits import (
     motion_limits,
     parse_limits,
 )
+from tauhat.excitation.repeated import Repeated
+from tauhat.excitation.sampled import SampledMotion, sampled_motion
 from tauhat.excitation.space import FourierSpace, SampledSpace, random_points
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
 
@@ -55,6 +58,8 @@ __all__ = [
     "MotionLimit",
     "MotionLimits",
     "MotionSamples",
+    "Repeated",
+    "SampledMotion",
     "SampledSpace",
     "Trajectory",
     "after_evidence",
@@ -72,4 +77,6 @@ __all__ = [
     "random_fourier",
     "random_points",
     "rest_basis",
+    "sampled_motion",
+    "with_exact_sign",
 ]

@@ -1,7 +1,7 @@
 """Descent inside joint limits: a logarithmic barrier, and a damped BFGS that never steps across a limit.
 
-A point keeps its limits when `|r| < 1`, `r = R x`; the barrier `-w sum ln(1 - r^2)` grows without bound towards them.
-BFGS starts from the barrier's own Hessian, which scales the variables as the limits do.
+A point keeps its limits when `|r| < 1`, `r = r0 + R x`; the barrier `-w sum ln(1 - r^2)` grows without bound towards
+them. BFGS starts from the barrier's own Hessian, which scales the variables as the limits do.
 
 Source: Nocedal, Wright, "Numerical Optimization", 2006, chapters 6 and 19.
 """
@@ -9,7 +9,7 @@ Source: Nocedal, Wright, "Numerical Optimization", 2006, chapters 6 and 19.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,17 +30,19 @@ class Barrier:
     """The limits of all joints as a penalty that is finite inside them only.
 
     rows : R, (n_v, n_r, n_x) parts of the limits that a point uses
+    rest : r0, (n_v, n_r) what the origin of the space uses of them
     weight : w, in units of the criterion
     guard : of the limits of several joints at once
     """
 
     rows: FloatArray
     weight: float
+    rest: FloatArray = field(default_factory=lambda: np.zeros((1, 1)))
     guard: Guard | None = None
 
     def used(self, x: FloatArray) -> FloatArray:
-        """Return r = R x of a point or a direction, (n_v, n_r)."""
-        return np.asarray(np.einsum("jrk,jk->jr", self.rows, x))
+        """Return r = r0 + R x of a point, (n_v, n_r)."""
+        return np.asarray(self.rest + np.einsum("jrk,jk->jr", self.rows, x))
 
     def at(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Return value and gradient, (n_v, n_x), at a point inside the joint limits; infinite outside the others."""
@@ -55,7 +57,7 @@ class Barrier:
 
     def longest(self, x: FloatArray, step: FloatArray) -> float:
         """Return how many times a step fits before a limit is met; infinite when none is."""
-        used, change = self.used(x), self.used(step)
+        used, change = self.used(x), self.used(step) - self.rest
         room = np.where(change > 0.0, 1.0 - used, 1.0 + used)
         tight = change != 0.0
         return float(np.min(room[tight] / np.abs(change[tight]), initial=np.inf))

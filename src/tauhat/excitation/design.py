@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
@@ -12,16 +12,27 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.blas import single_threaded
 from tauhat.dynamics.model import PLAIN_TERMS, TorqueModel, torque_model
+from tauhat.dynamics.motion import Motion
 from tauhat.dynamics.terms import Coulomb
 from tauhat.errors import ExcitationError
-from tauhat.excitation.criteria import Criterion, Mixed
+from tauhat.excitation.criteria import FLOOR, Criterion, Mixed
+from tauhat.excitation.excited import excited_spectrum
 from tauhat.excitation.fourier import FourierSeries
 from tauhat.excitation.genetic import GeneticSettings, Progress, evolve
 from tauhat.excitation.gradient import SAMPLES, polish
 from tauhat.excitation.guard import FINER, Guard
-from tauhat.excitation.information import SMOOTH_SIGN, Information, Knowledge, after_evidence, information
+from tauhat.excitation.information import (
+    SMOOTH_SIGN,
+    Information,
+    Knowledge,
+    after_evidence,
+    after_motions,
+    information,
+    with_exact_sign,
+)
 from tauhat.excitation.limits import LimitSet, MotionLimits
-from tauhat.excitation.poses import guard_of
+from tauhat.excitation.poses import guard_of, motion_space
+from tauhat.excitation.repeated import Repeated
 from tauhat.excitation.space import FourierSpace, random_points
 from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot
@@ -48,12 +59,13 @@ def method_named(name: str) -> Method:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Design:
-    """A designed motion and what it is worth.
+    """A designed motion and what it is worth, together with what was known before it.
 
     trajectory : one period, from rest to rest
     condition : of the regressor with columns scaled by constants, exact sign in the Coulomb columns
     log_det : of the scaled information matrix
     mean_error : root mean variance of the scaled parameters at unit torque noise
+    mean_error_before : the same without this motion, from what was known; infinite where something was not
     seconds, evaluations : what the search took
     margins : smallest unused part of each limit, over all joints and times; of distances, what is beyond the clearance
         in parts of 0.1 m
@@ -63,14 +75,16 @@ class Design:
     condition: float
     log_det: float
     mean_error: float
+    mean_error_before: float
     seconds: float
     evaluations: int
     margins: dict[str, float]
 
-    def recording(self, *, rate: float, joint_names: tuple[str, ...] = ()) -> Recording:
-        """Return the motion sampled `rate` times a second, from rest to rest, without torque."""
-        t = np.arange(int(np.floor(self.trajectory.duration * rate + 1e-9)) + 1) / rate
-        samples = self.trajectory.sample(t)
+    def recording(self, *, rate: float, joint_names: tuple[str, ...] = (), periods: int = 1) -> Recording:
+        """Return the motion, run `periods` times, sampled `rate` times a second, from rest to rest, without torque."""
+        motion = Repeated(series=self.trajectory, periods=periods)
+        t = np.arange(int(np.floor(motion.duration * rate + 1e-9)) + 1) / rate
+        samples = motion.sample(t)
         return Recording(
             t=samples.t, q=samples.q, dq=samples.dq, ddq=samples.ddq, joint_names=joint_names, name="motion"
         )
@@ -81,6 +95,7 @@ class Design:
             "condition": self.condition,
             "log_det": self.log_det,
             "mean_error": self.mean_error,
+            "mean_error_before": self.mean_error_before,
             "seconds": self.seconds,
             "evaluations": self.evaluations,
             "limits": self.margins,
@@ -100,6 +115,8 @@ class DesignSettings:
     genetic : settings of the genetic search
     limits : further limits than the robot's own, or others
     after : what is already known: the motion is then designed for what is still uncertain
+    earlier : motions of the same period that will be run as well: the motion is designed for what they leave uncertain
+    counted : gives the columns that count for a model, such as `payload_information`; all by default
     """
 
     period: float = 10.0
@@ -110,11 +127,16 @@ class DesignSettings:
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
     limits: LimitSet | None = None
     after: Knowledge | None = None
+    earlier: tuple[FourierSeries, ...] = ()
+    counted: Callable[[TorqueModel], Information] = information
 
     def __post_init__(self) -> None:
         method_named(self.method)
         if self.starts < 1:
             raise ExcitationError("at least one start is needed", got=self.starts)
+        other = next((series.period for series in self.earlier if series.period != self.period), None)
+        if other is not None:
+            raise ExcitationError("an earlier motion has another period", expected=f"{self.period:g} s", got=other)
 
 
 @single_threaded
@@ -147,17 +169,20 @@ def design(
     began = time.perf_counter()
     limits = wanted.limits or LimitSet(robot=robot)
     limits.check_robot(robot)
-    of_joints = limits.of_joints(margin=wanted.margin)
-    space = FourierSpace(limits=of_joints, period=wanted.period, harmonics=wanted.harmonics)
-    facts = information(_smooth(torque_model(limits.robot, terms), of_joints))
+    space = motion_space(limits, margin=wanted.margin, period=wanted.period, harmonics=wanted.harmonics)
+    known = wanted.counted(_smooth(torque_model(limits.robot, terms), space.limits))
     if wanted.after is not None:
-        facts = after_evidence(facts, wanted.after, seconds=wanted.period)
+        known = after_evidence(known, wanted.after, seconds=wanted.period)
+    facts = after_motions(known, [_run_of(series) for series in wanted.earlier])
     guard = None
     if limits.others:
         guard = guard_of(space, limits, margin=wanted.margin, samples=SAMPLES, rng=rng)
     search = _Search(facts=facts, space=space, criterion=chosen, settings=wanted, guard=guard)
     best, evaluations = search.run(rng, progress)
-    return _design(limits, facts, space, best, seconds=time.perf_counter() - began, evaluations=evaluations)
+    exact = after_motions(
+        replace(known, model=with_exact_sign(known.model)), [_run_of(series) for series in wanted.earlier]
+    )
+    return _design(limits, exact, space, best, seconds=time.perf_counter() - began, evaluations=evaluations)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -207,21 +232,32 @@ def _smooth(model: TorqueModel, limits: MotionLimits) -> TorqueModel:
     return model.with_term(Coulomb(widths=tuple((SMOOTH_SIGN * limits.velocity).tolist())))
 
 
+def _run_of(series: FourierSeries) -> Motion:
+    """Return one run of a motion on the fine grid."""
+    t = np.arange(_REPORT_SAMPLES, dtype=np.float64) * (series.period / _REPORT_SAMPLES)
+    samples = series.sample(t)
+    q, dq, ddq = (np.ascontiguousarray(part.T) for part in (samples.q, samples.dq, samples.ddq))
+    return Motion(q=q, dq=dq, ddq=ddq)
+
+
+def _mean_error(eigenvalues: FloatArray) -> float:
+    """Return the root mean variance of scaled parameters whose information has these eigenvalues, smallest first."""
+    if eigenvalues[0] <= FLOOR * eigenvalues[-1]:
+        return float("inf")
+    return float(np.sqrt(np.mean(1.0 / eigenvalues)))
+
+
 def _design(
     limits: LimitSet, facts: Information, space: FourierSpace, point: FloatArray, *, seconds: float, evaluations: int
 ) -> Design:
-    model = facts.model
-    if any(term.key == Coulomb.key for term in model.terms):
-        facts = replace(facts, model=model.with_term(Coulomb()))
-    eigenvalues = np.linalg.eigvalsh(facts.matrix(space.grid(_REPORT_SAMPLES).motion(point)))
-    if eigenvalues[0] <= 0.0:
-        raise ExcitationError("the motion leaves a column of the model without excitation", where=limits.robot.name)
+    eigenvalues = excited_spectrum(facts, facts.matrix(space.grid(_REPORT_SAMPLES).motion(point)))
     series = space.series(point)
     return Design(
         trajectory=series,
         condition=float(np.sqrt(eigenvalues[-1] / eigenvalues[0])),
         log_det=float(np.log(eigenvalues).sum()),
         mean_error=float(np.sqrt(np.mean(1.0 / eigenvalues))),
+        mean_error_before=_mean_error(np.asarray(np.linalg.eigvalsh(facts.prior))),
         seconds=seconds,
         evaluations=evaluations,
         margins=limit_margins(series, limits.of_joints()) | _further_margins(space, point, limits),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -89,6 +89,19 @@ class FourierSeries:
         if odd:
             raise ExcitationError("free coefficients come in pairs", expected="2 n_h - 2 columns", got=free.shape[1])
         return cls(period=period, coefficients=free @ rest_basis(harmonics).T, offset=offset)
+
+    @classmethod
+    def from_start(cls, free: FloatArray, *, start: FloatArray, period: float) -> FourierSeries:
+        """Return the series at rest that starts and ends at a pose: `offset = start - sum_k b_k`.
+
+        Parameters
+        ----------
+        free : (n_v, 2 n_h - 2) as for `from_free`
+        start : (n_v,) [rad or m]
+        period : [s]
+        """
+        shape = cls.from_free(free, offset=np.zeros(np.size(start)), period=period)
+        return replace(shape, offset=start - shape.coefficients[:, shape.n_h :].sum(axis=1))
 
     @property
     def free(self) -> FloatArray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
@@ -26,6 +27,8 @@ LIMIT_SAMPLES = 100  # per period at which limits are held while optimising; the
 _MAP_POWER = 40.0
 _INSIDE = 0.99  # where the barrier starts, in parts of the limits
 _ITERATIONS = 150
+
+_Walls: TypeAlias = tuple[FloatArray, FloatArray]  # joint limits `|rest + rows x| <= 1`: rows and rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,22 +89,23 @@ def polish(
     guard : keeps limits of several joints at once, tightened where they were exceeded between the samples
     """
     objective = Objective(information=information, grid=space.grid(samples))
-    rows = space.grid(LIMIT_SAMPLES).rows()
+    coarse = space.grid(LIMIT_SAMPLES)
+    walls = (coarse.rows(), coarse.rest())
     schedule = schedule_of(criterion)
     x, evaluations = _INSIDE * space.shrunk(start), 0
     for power in schedule.powers:
-        x, count = _softly(objective, rows, x, sharpened(criterion, power))
+        x, count = _softly(objective, walls, x, sharpened(criterion, power))
         evaluations += count
-    y = _INSIDE * space.shrunk(soft_map(rows, x)[0])
+    y = _INSIDE * space.shrunk(soft_map(*walls, x)[0])
     size = criterion.size(information.n)
     stages = [(weight * size, sharpened(criterion, power)) for weight, power in schedule.barriers]
-    y, count = _with_barriers(objective, rows, _entered(objective, guard, y, stages[0][1]), stages, guard)
+    y, count = _with_barriers(objective, walls, _entered(objective, guard, y, stages[0][1]), stages, guard)
     evaluations += count
     if guard is None:
         return space.shrunk(y), evaluations
     if not guard.holds(y):
         guard = guard.tightened(y)
-        y, count = _with_barriers(objective, rows, _entered(objective, guard, y, stages[-1][1]), stages[-1:], guard)
+        y, count = _with_barriers(objective, walls, _entered(objective, guard, y, stages[-1][1]), stages[-1:], guard)
         evaluations += count
     return guard.settled(y), evaluations
 
@@ -119,24 +123,33 @@ def _entered(objective: Objective, guard: Guard | None, y: FloatArray, criterion
 
 
 def _with_barriers(
-    objective: Objective, rows: FloatArray, y: FloatArray, stages: list[tuple[float, Criterion]], guard: Guard | None
+    objective: Objective, walls: _Walls, y: FloatArray, stages: list[tuple[float, Criterion]], guard: Guard | None
 ) -> tuple[FloatArray, int]:
     evaluations = 0
     for weight, criterion in stages:
-        barrier = Barrier(rows=rows, weight=weight, guard=guard)
+        barrier = Barrier(rows=walls[0], rest=walls[1], weight=weight, guard=guard)
         y, count = descend(partial(objective.at, criterion=criterion), barrier, y, iterations=_ITERATIONS)
         evaluations += count
     return y, evaluations
 
 
-def soft_map(rows: FloatArray, x: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-    """Return the image of a point strictly inside the limits on the grid, and the map's pullback of gradients."""
+def soft_map(
+    rows: FloatArray, rest: FloatArray, x: FloatArray
+) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+    """Return the image of a point strictly inside the limits on the grid, and the map's pullback of gradients.
+
+    Parameters
+    ----------
+    rows, rest : (n_v, n_r, n_x), (n_v, n_r) limits `|rest + rows x| <= 1`; what counts is the part of the way from the
+        rest to the limit on either side
+    """
     used = np.einsum("jrk,jk->jr", rows, x)
-    size = np.abs(used)
+    side = np.sign(used) / (1.0 - np.sign(used) * rest)
+    size = side * used
     largest = np.maximum(size.max(axis=1), 1.0)
     total = np.sum((size / largest[:, None]) ** _MAP_POWER, axis=1) + largest**-_MAP_POWER
     gauge = largest * total ** (1.0 / _MAP_POWER)
-    slope = np.einsum("jrk,jr->jk", rows, np.sign(used) * (size / gauge[:, None]) ** (_MAP_POWER - 1.0))
+    slope = np.einsum("jrk,jr->jk", rows, side * (size / gauge[:, None]) ** (_MAP_POWER - 1.0))
 
     def pull(gradient: FloatArray) -> FloatArray:
         along = np.sum(gradient * x, axis=1) / gauge**2
@@ -145,11 +158,11 @@ def soft_map(rows: FloatArray, x: FloatArray) -> tuple[FloatArray, Callable[[Flo
     return x / gauge[:, None], pull
 
 
-def _softly(objective: Objective, rows: FloatArray, x: FloatArray, criterion: Criterion) -> tuple[FloatArray, int]:
+def _softly(objective: Objective, walls: _Walls, x: FloatArray, criterion: Criterion) -> tuple[FloatArray, int]:
     from scipy.optimize import minimize
 
     def mapped(flat: FloatArray) -> tuple[float, FloatArray]:
-        image, pull = soft_map(rows, flat.reshape(x.shape))
+        image, pull = soft_map(*walls, flat.reshape(x.shape))
         value, gradient = objective.at(image, criterion)
         return value, pull(gradient).ravel()
 

@@ -1,7 +1,12 @@
-"""Limits of several joints at once while a motion is designed: a way in, a barrier, and exactness on a fine grid.
+"""Limits of several joints at once while a motion is designed: a way in, a barrier, and limits kept at all times.
 
 The way in is constructed: at rest in a pose inside all limits every margin is positive, so any motion shrunk far enough
 towards this pose is inside too.
+
+In the end the limits are held on a grid ten times finer, and between its samples too: a function whose curvature is at
+most m'' lies no deeper than `m'' h^2 / 8` below the lower of two samples h apart. The curvature is taken from the
+second differences around the interval, doubled because it may grow inside it. Kinks downwards do not occur: margins are
+the least of smooth functions, whose kinks point up.
 """
 
 from __future__ import annotations
@@ -18,6 +23,7 @@ from tauhat.excitation.space import FourierSpace, SampledSpace
 
 FINER = 10  # times as many samples as while optimising: where limits are held exactly
 INSIDE = 1e-3  # smallest margin of a pose that motions are grown from
+_SWELL = 2.0  # times that a margin's curvature may be larger between samples than at the samples around
 _START = 0.03  # margin a start has, if its pose has twice that
 _STEPS = np.append(0.8 ** np.arange(24), (1e-3, 1e-4, 1e-5))
 _SHRINKS = np.concatenate([[0.0], 1e-4 * 2.0 ** np.arange(13), [0.9, 0.95, 0.98, 0.99, 0.999, 1.0]])
@@ -101,46 +107,44 @@ class Guard:
     def one_start(self, x: FloatArray, index: int) -> FloatArray:
         """Return the point shrunk towards one pose, counted round, until it is inside, (n_v, 2 n_h - 1)."""
         rest = self._rests()[index % len(self.poses)]
-        line = rest + _STEPS[:, None, None] * (x - rest)
-        room = self.worst(line, self.samples)
-        inside = np.flatnonzero(room > min(_START, 0.5 * room[-1]))
-        return np.asarray(line[inside[0]] if inside.size else rest)
+        enough = min(_START, 0.5 * float(self.worst(rest[None], 1)[0]))
+        for steps in np.array_split(_STEPS, len(_STEPS) // 4):  # the longest first: most need no shorter ones
+            line = rest + steps[:, None, None] * (x - rest)
+            inside = np.flatnonzero(self.worst(line, self.samples) > enough)
+            if inside.size:
+                return np.asarray(line[inside[0]])
+        return np.asarray(rest)
 
     def settled(self, x: FloatArray) -> FloatArray:
-        """Return the point shrunk as little as it takes to be inside on the fine grid, joint limits at all times."""
-        point, fine = self.space.shrunk(x), FINER * self.samples
-        if self._holds(point, fine):
+        """Return the point shrunk as little as it takes to be inside at all times."""
+        point = self.space.shrunk(x)
+        if self.holds(point):
             return point
         rests = self._rests()
         for shrink in _SHRINKS[1:]:
             for rest in rests:
                 candidate = rest + (1.0 - shrink) * (point - rest)
-                if self._holds(candidate, fine):
+                if self.holds(candidate):
                     return np.asarray(candidate)
         raise ExcitationError("no motion inside all limits was found", remedy="state a home pose with more room")
 
     def tightened(self, x: FloatArray) -> Guard:
-        """Return the guard with limits drawn in by what the point exceeds on the fine grid."""
-        motion = self.space.grid(FINER * self.samples).motion(x)
-        excess = [max(-float(room.min()) * self._size(k), 0.0) for k, room in enumerate(self.plain.rooms(motion))]
+        """Return the guard with limits drawn in by what the point exceeds on the fine grid and between its samples."""
+        excess = [max(-room * self._size(k), 0.0) for k, room in enumerate(self._lowest(x))]
         return replace(self, tightening=tuple(a + 1.2 * b for a, b in zip(self.tightening, excess, strict=True)))
 
-    @property
-    def plain(self) -> Guard:
-        """The guard without tightening."""
-        return replace(self, tightening=(0.0,) * len(self.limits))
-
     def holds(self, x: FloatArray) -> bool:
-        """Return whether a point keeps the limits on the fine grid."""
-        return self._holds(x, FINER * self.samples)
+        """Return whether a point keeps the limits, without tightening, on the fine grid and between its samples."""
+        return min(self._lowest(x)) >= 0.0
 
-    def _holds(self, x: FloatArray, samples: int) -> bool:
-        return bool(self.plain.worst(x[None], samples)[0] >= 0.0)
+    def _lowest(self, x: FloatArray) -> list[float]:
+        """Return the least margin left of each limit, without tightening, at all times."""
+        motion = self.space.grid(FINER * self.samples).motion(x)
+        plain = replace(self, tightening=(0.0,) * len(self.limits))
+        return [float(lowest_between(room).min()) for room in plain.rooms(motion)]
 
     def _rests(self) -> FloatArray:
-        rests = np.zeros((len(self.poses), *self.space.shape))
-        rests[:, :, -1] = self.poses - self.space.middle
-        return rests
+        return np.array([self.space.resting(pose) for pose in self.poses])
 
     def _size(self, limit: int) -> float:
         return 1.0 - self.margin if self.limits[limit].relative else 1.0
@@ -148,6 +152,14 @@ class Guard:
     def _room(self, limit: int, margins: FloatArray) -> FloatArray:
         size = self._size(limit)
         return (margins - (1.0 - size) - self.tightening[limit]) / size
+
+
+def lowest_between(margins: FloatArray) -> FloatArray:
+    """Return how low margins (n_c, n_t) of a periodic motion may be between each sample and the next, (n_c, n_t)."""
+    ahead, behind = np.roll(margins, -1, axis=1), np.roll(margins, 1, axis=1)
+    bend = np.maximum(ahead - 2.0 * margins + behind, 0.0)
+    around = np.max([np.roll(bend, shift, axis=1) for shift in (1, 0, -1, -2)], axis=0)
+    return np.asarray(np.minimum(margins, ahead) - _SWELL / 8.0 * around)
 
 
 def pose_rooms(limits: tuple[MotionLimit, ...], q: FloatArray, *, margin: float) -> FloatArray:

@@ -11,7 +11,7 @@ from tauhat.arrays import FloatArray, IntArray, frozen, read_only
 from tauhat.dynamics.base import base_parameters, independent_among, random_motion
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.dynamics.motion import Motion, MotionGradient
-from tauhat.dynamics.terms import INERTIAL_SYMBOLS
+from tauhat.dynamics.terms import INERTIAL_SYMBOLS, Coulomb
 from tauhat.errors import ExcitationError
 from tauhat.excitation.criteria import Criterion
 
@@ -139,6 +139,13 @@ def _information(model: TorqueModel, columns: IntArray, torque_noise: FloatArray
     )
 
 
+def with_exact_sign(model: TorqueModel) -> TorqueModel:
+    """Return the model with the exact sign of the speed in its Coulomb columns, where it has some."""
+    if all(term.key != Coulomb.key for term in model.terms):
+        return model
+    return model.with_term(Coulomb())
+
+
 def after_motions(facts: Information, motions: Iterable[Motion]) -> Information:
     """Return the same columns with what equally long motions already told about them."""
     prior = sum((facts.matrix(motion) - facts.prior for motion in motions), start=facts.prior)
@@ -149,19 +156,19 @@ def after_motions(facts: Information, motions: Iterable[Motion]) -> Information:
 class Knowledge:
     """What an estimate already knows, for the motion that comes after it.
 
-    columns : (n,) which parameters the covariance is of, `estimate.base.independent`
+    names : (n,) of the parameters that the covariance is of
     covariance : (n, n) `estimate.covariance`
     torque_noise : (n_v,) `estimate.joint_rms` [Nm or N]
     rows_per_second : independent rows that a second of motion gives, twice the low-pass of the estimate [1/s]
     """
 
-    columns: IntArray
+    names: tuple[str, ...]
     covariance: FloatArray
     torque_noise: FloatArray
     rows_per_second: float
 
     def __post_init__(self) -> None:
-        n = np.size(self.columns)
+        n = len(self.names)
         object.__setattr__(self, "covariance", frozen("covariance", self.covariance, (n, n)))
         object.__setattr__(self, "torque_noise", frozen("torque_noise", self.torque_noise, (None,)))
         if not ((self.torque_noise > 0).all() and self.rows_per_second > 0):
@@ -171,6 +178,8 @@ class Knowledge:
 def after_evidence(facts: Information, known: Knowledge, *, seconds: float) -> Information:
     """Return the same columns with what is already known about them, and joints weighted by the estimate's residuals.
 
+    The estimate may be of a model with other friction: what both models have counts as known, the rest as unknown.
+
     Parameters
     ----------
     seconds : length of the motion to design
@@ -178,16 +187,20 @@ def after_evidence(facts: Information, known: Knowledge, *, seconds: float) -> I
     Raises
     ------
     ExcitationError
-        when the estimate is of another model.
+        when the estimate knows none of the columns.
     """
-    if not np.array_equal(facts.columns, known.columns):
-        raise ExcitationError(
-            "the estimate is of another model than the motion is designed for",
-            where=facts.model.robot.name, remedy="give the same robot and --model as for identify",
-        )  # fmt: skip
-    told = np.linalg.pinv(known.covariance * np.outer(facts.scales, facts.scales), hermitian=True)
-    rows = seconds * known.rows_per_second
-    return replace(facts, weights=read_only(1.0 / known.torque_noise), prior=0.5 * (told + told.T) / rows)
+    parameters = facts.model.parameters
+    wanted = [parameters[index].name for index in facts.columns]
+    place = {name: index for index, name in enumerate(known.names)}
+    here = np.array([index for index, name in enumerate(wanted) if name in place], dtype=np.intp)
+    there = np.array([place[wanted[index]] for index in here], dtype=np.intp)
+    if not here.size:
+        raise ExcitationError("the estimate knows no parameter of this model", where=facts.model.robot.name)
+    scales = facts.scales[here]
+    told = np.linalg.pinv(known.covariance[np.ix_(there, there)] * np.outer(scales, scales), hermitian=True)
+    prior = np.zeros((facts.n, facts.n))
+    prior[np.ix_(here, here)] = 0.5 * (told + told.T) / (seconds * known.rows_per_second)
+    return replace(facts, weights=read_only(1.0 / known.torque_noise), prior=prior)
 
 
 def _columns(model: TorqueModel, wanted: set[str]) -> IntArray:

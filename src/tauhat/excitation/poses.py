@@ -8,7 +8,7 @@ from tauhat.arrays import FloatArray
 from tauhat.dynamics.motion import Motion
 from tauhat.errors import ExcitationError
 from tauhat.excitation.guard import INSIDE, Guard, pose_rooms
-from tauhat.excitation.limits import LimitSet, MotionLimit
+from tauhat.excitation.limits import DistanceLimit, LimitSet, MotionLimit, MotionLimits
 from tauhat.excitation.space import FourierSpace
 
 _TRIALS = 2000  # random poses
@@ -19,13 +19,32 @@ _MOVED = 12  # poses that are moved
 _REACH = 0.98  # of the joints' ranges
 
 
+def motion_space(limits: LimitSet, *, margin: float, period: float, harmonics: int) -> FourierSpace:
+    """Return the space of motions inside the joint limits, which start at the start pose where one is stated.
+
+    Parameters
+    ----------
+    margin : part of every limit that is left unused
+    period : [s]
+
+    Raises
+    ------
+    ExcitationError
+        when the start pose is not strictly inside: names the joint.
+    """
+    of_joints = limits.of_joints(margin=margin)
+    if limits.start is not None:
+        _check_inside(limits.start, of_joints, limits, "start pose outside joint limits", margin)
+    return FourierSpace(limits=of_joints, period=period, harmonics=harmonics, start=limits.start)
+
+
 def guard_of(space: FourierSpace, limits: LimitSet, *, margin: float, samples: int, rng: np.random.Generator) -> Guard:
     """Return the guard of the limits of several joints at once, with poses inside them.
 
     Raises
     ------
     ExcitationError
-        when no pose keeps a limit, or the home pose does not.
+        when no pose keeps a limit, or the start or home pose does not.
     """
     poses = feasible_poses(space, limits, margin=margin, rng=rng)
     return Guard(
@@ -44,10 +63,12 @@ def feasible_poses(space: FourierSpace, limits: LimitSet, *, margin: float, rng:
     Raises
     ------
     ExcitationError
-        when there is none: names the limit that no pose keeps, and by how much it is missed.
+        when there is none, or the stated one is none: names the limit and by how much it is missed.
     """
+    if limits.start is not None:
+        return _kept_start(limits, limits.start, margin)
     if limits.home is not None:
-        return _home(space, limits, margin)
+        return _home(space, limits, limits.home, margin)
     trials = space.middle + _REACH * space.reach * rng.uniform(-1.0, 1.0, (_TRIALS, space.n_v))
     trials[0] = space.middle
     rooms = pose_rooms(limits.others, trials.T, margin=margin)
@@ -65,18 +86,35 @@ def feasible_poses(space: FourierSpace, limits: LimitSet, *, margin: float, rng:
     return np.asarray(trials[[index for index in chosen if least[index] > INSIDE]])
 
 
-def _home(space: FourierSpace, limits: LimitSet, margin: float) -> FloatArray:
-    home = np.asarray(limits.home)
-    outside = np.flatnonzero((home <= space.limits.lower) | (home >= space.limits.upper))
+def _check_inside(pose: FloatArray, room: MotionLimits, limits: LimitSet, what: str, margin: float) -> None:
+    outside = np.flatnonzero((pose <= room.lower) | (pose >= room.upper))
     if outside.size:
         joint = int(outside[0])
-        bounds = f"[{space.limits.lower[joint]:g}, {space.limits.upper[joint]:g}]"
         raise ExcitationError(
-            "the home pose is not inside the position limits",
+            what,
             where=f"joint {limits.robot.joint_names[joint]}",
-            expected=bounds,
-            got=f"{home[joint]:g}",
+            expected=f"inside ({room.lower[joint]:g}, {room.upper[joint]:g})",
+            got=f"{pose[joint]:g}",
+            remedy=f"{100 * margin:g} % of the range are to be left unused" if margin > 0.0 else "",
         )
+
+
+def _kept_start(limits: LimitSet, start: FloatArray, margin: float) -> FloatArray:
+    rooms = pose_rooms(limits.others, start[:, None], margin=margin)[:, 0]
+    if rooms.min() > 0.0:
+        return start[None, :]
+    limit = limits.others[int(rooms.argmin())]
+    what, got = "the start pose does not keep the limit", _worst(limit, start)
+    if isinstance(limit, DistanceLimit):
+        row, margin_there = _worst_row(limit, start)
+        depth = -limit.gap(margin_there)
+        what = "start pose in collision" if depth > 0.0 else "start pose nearer than the clearance"
+        got = f"{limit.parts[row]}: {1e3 * depth:.4g} mm deep" if depth > 0.0 else got
+    raise ExcitationError(what, where=limit.name, got=got, remedy=_reserve(limit, margin))
+
+
+def _home(space: FourierSpace, limits: LimitSet, home: FloatArray, margin: float) -> FloatArray:
+    _check_inside(home, space.limits, limits, "the home pose is not inside the position limits", margin)
     rooms = pose_rooms(limits.others, home[:, None], margin=margin)[:, 0]
     if rooms.min() <= 0.0:
         limit = limits.others[int(rooms.argmin())]
@@ -121,7 +159,7 @@ def _reason(space: FourierSpace, limits: tuple[MotionLimit, ...], poses: FloatAr
                 "no pose keeps the limit",
                 where=limit.name,
                 got=_worst(limit, alone[rooms.argmax()]),
-                remedy=_reserve(limit, margin),
+                remedy="; ".join(filter(None, (limit.at_rest(), _reserve(limit, margin)))),
             )
     rooms = pose_rooms(limits, poses.T, margin=margin)
     best = int(np.minimum(rooms, 0.0).sum(axis=0).argmax())
@@ -139,7 +177,12 @@ def _reserve(limit: MotionLimit, margin: float) -> str:
 
 
 def _worst(limit: MotionLimit, pose: FloatArray) -> str:
+    row, margin = _worst_row(limit, pose)
+    return f"{limit.parts[row]}: {limit.missing(row, margin)}"
+
+
+def _worst_row(limit: MotionLimit, pose: FloatArray) -> tuple[int, float]:
     still = np.zeros((pose.size, 1))
     margins = limit.margins(Motion(q=pose[:, None], dq=still, ddq=still))[:, 0]
     row = int(margins.argmin())
-    return f"{limit.parts[row]}: {limit.missing(row, float(margins[row]))}"
+    return row, float(margins[row])

@@ -13,6 +13,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import RobotError
 from tauhat.robots.joint import Joint, Limits
+from tauhat.robots.solid import Solid
 
 EARTH = (0.0, 0.0, -9.81)
 _MOST_JOINTS = 100
@@ -44,6 +45,7 @@ class Robot:
     joints : in topological order, a parent before its children
     gravity : (3,) acceleration of free fall in the base frame [m/s^2]
     frames : named frames on the links, the tool among them
+    solids : what the links are made of, for collisions, where the description says so
     source : where it came from, for provenance
     """
 
@@ -51,11 +53,13 @@ class Robot:
     joints: tuple[Joint, ...]
     gravity: FloatArray = field(default_factory=lambda: np.array(EARTH))
     frames: tuple[Frame, ...] = ()
+    solids: tuple[Solid, ...] = ()
     source: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "joints", tuple(self.joints))
         object.__setattr__(self, "frames", tuple(self.frames))
+        object.__setattr__(self, "solids", tuple(self.solids))
         object.__setattr__(self, "gravity", frozen("gravity", self.gravity, (3,), where=self.name))
         if not self.joints:
             raise RobotError("no movable joint", where=self.name, remedy="are all joints fixed or locked?")
@@ -130,7 +134,10 @@ class Robot:
         return replace(self, gravity=np.array(list(gravity), dtype=np.float64))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data that JSON can hold and `from_dict` reads back exactly."""
+        """Return plain data that JSON can hold and `from_dict` reads back exactly, without the solids.
+
+        Nothing that is estimated rests on the solids, and their meshes are files that need not follow the data.
+        """
         return {
             "name": self.name,
             "gravity": self.gravity.tolist(),
@@ -182,6 +189,9 @@ def _check_frames(robot: Robot) -> None:
             raise RobotError(
                 "a frame is fixed to a joint that is not there", where=f"frame {frame.name}", got=frame.joint
             )
+    for solid in robot.solids:
+        if solid.frame not in names:
+            raise RobotError("a solid is fixed to a frame that is not there", where=robot.name, got=solid.frame)
 
 
 def _joint_to_dict(joint: Joint) -> dict[str, Any]:

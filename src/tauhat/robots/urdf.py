@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
@@ -18,6 +19,7 @@ from tauhat.robots.locking import lock_joints
 from tauhat.robots.robot import EARTH, Frame, Robot
 from tauhat.robots.source import DescriptionSource, source_from_file, source_from_text
 from tauhat.robots.urdf_description import Placement, UrdfDescription, UrdfInertial, UrdfJoint, describe_urdf
+from tauhat.robots.urdf_solids import urdf_solids
 from tauhat.robots.urdf_tree import check_tree
 from tauhat.robots.urdf_xml import parse_untrusted_xml
 
@@ -27,11 +29,11 @@ _MOST_BYTES = 20_000_000
 def robot_from_urdf(
     source: str | Path, *, locked: Mapping[str, float] | None = None, gravity: Sequence[float] = EARTH
 ) -> Robot:
-    """Return the robot that a URDF describes; meshes need not exist, they are never loaded.
+    """Return the robot that a URDF describes; meshes need not exist, they are never loaded here.
 
     Fixed joints are merged into the links that carry them, every URDF link stays as a frame, joints come in
     Pinocchio's order, continuous joints turn without limits. `<dynamics damping friction>` become nominal friction,
-    the attribute `armature`, where present, the nominal rotor inertia.
+    the attribute `armature`, where present, the nominal rotor inertia. `<collision>` geometry becomes the solids.
 
     Parameters
     ----------
@@ -44,10 +46,13 @@ def robot_from_urdf(
     RobotError
         what the file says is malformed, hostile, not a tree, or no robot with mass.
     """
-    content = _read(source)
-    description = describe_urdf(parse_untrusted_xml(content), where=content.where, default_name=content.name)
+    content = urdf_source(source)
+    root = parse_untrusted_xml(content)
+    description = describe_urdf(root, where=content.where, default_name=content.name)
     check_tree(description)
     whole = _assembled(description, gravity, source=Path(content.where).name)
+    folder = "" if content.where == "text" else str(Path(source).absolute().parent)
+    whole = replace(whole, solids=urdf_solids(root, where=content.where, folder=folder))
     robot = lock_joints(whole, _frozen_positions(description, dict(locked or {})))
     if not robot.has_inertia:
         remedy = "add <inertial> to the links, or describe the kinematics by a DH table"
@@ -56,7 +61,8 @@ def robot_from_urdf(
     return robot
 
 
-def _read(source: str | Path) -> DescriptionSource:
+def urdf_source(source: str | Path) -> DescriptionSource:
+    """Return the bytes of a URDF given by its path or as text that begins with "<"."""
     if isinstance(source, str):
         text = source.lstrip("\ufeff \t\r\n")
         if text.startswith("<"):

@@ -84,7 +84,7 @@ class UrdfDescription:
 
 
 def describe_urdf(root: Element, *, where: str, default_name: str) -> UrdfDescription:
-    """Return the checked content of a parsed URDF; geometry is never looked at.
+    """Return the checked content of a parsed URDF; geometry is not looked at.
 
     Raises
     ------

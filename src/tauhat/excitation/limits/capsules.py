@@ -1,15 +1,17 @@
-"""What stands for the body of the robot: a capsule from each joint to the next."""
+"""What stands for the body of the robot: its solids where it states them, else capsules from joint to joint."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tauhat.arrays import FloatArray, frozen
-from tauhat.errors import ExcitationError
+from tauhat.errors import ExcitationError, TauhatWarning
 from tauhat.excitation.limits.link_poses import LinkPoses, link_poses
+from tauhat.excitation.limits.solids import LinkSolid, capsule_solid, link_solid
 from tauhat.robots.naming import advice_on_name
 from tauhat.robots.robot import Frame, Robot
 
@@ -49,17 +51,37 @@ class Capsule:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Body:
-    """A robot with the capsules that stand for it.
+    """A robot with the parts that stand for it: capsules first, then solids.
 
-    capsules : in any order, several a link where it branches
+    capsules, solids : in any order, several a link where it branches
+    parts : all of them as solids
     """
 
     robot: Robot
     capsules: tuple[Capsule, ...]
+    solids: tuple[LinkSolid, ...] = ()
+    parts: tuple[LinkSolid, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        round_ones = [
+            capsule_solid(
+                link=capsule.link,
+                label=link_name(self.robot, capsule.link),
+                ends=(capsule.start, capsule.end),
+                radius=capsule.radius,
+            )
+            for capsule in self.capsules
+        ]
+        object.__setattr__(self, "parts", (*round_ones, *self.solids))
 
     def label(self, index: int) -> str:
-        """Return how messages call the link of a capsule."""
-        return link_name(self.robot, self.capsules[index].link)
+        """Return how messages call a part."""
+        return self.parts[index].label
+
+    @property
+    def links(self) -> tuple[int, ...]:
+        """The link of each part."""
+        return tuple(part.link for part in self.parts)
 
     @property
     def radii(self) -> FloatArray:
@@ -80,6 +102,13 @@ class Body:
                 if np.ptp(path, axis=0).max() > _STILL:
                     found.append((index, getattr(self.capsules[index], side)))
         return tuple(found)
+
+    def moving_parts(self) -> tuple[int, ...]:
+        """Return the parts that the joints can move; one that only turns about its own axis stands still."""
+        poses = self.random_poses()
+        return tuple(
+            index for index, part in enumerate(self.parts) if np.ptp(part.placed_corners(poses), axis=1).max() > _STILL
+        )
 
     def random_poses(self) -> LinkPoses:
         """Return always the same random poses, all over the joints' ranges."""
@@ -125,6 +154,55 @@ def link_capsules(
     if not (derived or given):
         raise ExcitationError("no link is long enough to hit anything", where=robot.name, remedy="state capsules")
     return Body(robot=robot, capsules=(*derived, *given))
+
+
+def robot_body(
+    robot: Robot,
+    tool: Frame,
+    *,
+    radius: float | Mapping[str, float] | None = None,
+    given: Sequence[Capsule] = (),
+) -> Body:
+    """Return the solids that the robot's description states, and capsules for the other links.
+
+    Links with stated capsules, or a radius under their name, are capsules. Where the geometry of a link cannot be had,
+    its capsules stand beside what there is, and a warning names it.
+
+    Parameters
+    ----------
+    tool, radius, given : as for `link_capsules`
+    """
+    body = link_capsules(robot, tool, radius=radius, given=given)
+    named = radius if isinstance(radius, Mapping) else {}
+    stated = {capsule.link for capsule in given} | {
+        link for link in range(-1, robot.n_v) if (BASE if link < 0 else robot.joint_names[link]) in named
+    }
+    solids, lacking = _solids_of(robot, stated)
+    covered = {solid.link for solid in solids} - lacking
+    return Body(
+        robot=robot,
+        capsules=tuple(capsule for capsule in body.capsules if capsule.link not in covered),
+        solids=solids,
+    )
+
+
+def _solids_of(robot: Robot, stated: set[int]) -> tuple[tuple[LinkSolid, ...], set[int]]:
+    """Return the solids of all links but the stated ones, and the links of which some could not be had."""
+    carriers = {frame.name: frame.joint for frame in robot.frames}
+    solids, lacking, reasons = [], set(), {}
+    for solid in robot.solids:
+        if carriers[solid.frame] in stated:
+            continue
+        try:
+            solids.append(link_solid(robot, solid))
+        except ExcitationError as error:
+            lacking.add(carriers[solid.frame])
+            reasons[solid.frame] = f"{error.what}{f' ({error.got})' if error.got else ''}"
+    for link, reason in reasons.items():
+        warnings.warn(
+            f"link {link}: a capsule stands for its collision geometry: {reason}", TauhatWarning, stacklevel=2
+        )
+    return tuple(solids), lacking
 
 
 def _radii(robot: Robot, radius: float | Mapping[str, float] | None, *, default: float) -> dict[int, float]:

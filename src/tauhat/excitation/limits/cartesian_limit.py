@@ -96,7 +96,7 @@ class ToolBox(MotionLimit):
 
     def missing(self, row: int, margin: float) -> str:
         """Return how far outside the tool is."""
-        return f"{-1e3 * margin * self.half[row % 3]:.3g} mm outside"
+        return f"{-1e3 * margin * self.half[row % 3]:.4g} mm outside"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,4 +1,4 @@
-"""The links stay clear of each other and of half spaces: distances between segments in closed form."""
+"""The links stay clear of each other and of half spaces: in closed form between capsules, by coal between solids."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tauhat.arrays import FloatArray, IntArray, frozen, read_only
 from tauhat.dynamics.motion import Motion, MotionGradient
 from tauhat.errors import ExcitationError, TauhatWarning
 from tauhat.excitation.limits.capsules import Body
+from tauhat.excitation.limits.distances import Separation, placed, separation
 from tauhat.excitation.limits.link_poses import (
     LinkPoses,
     Wrenches,
@@ -24,10 +25,12 @@ from tauhat.excitation.limits.link_poses import (
     no_wrenches,
 )
 from tauhat.excitation.limits.motion_limit import MotionLimit, Pull
+from tauhat.excitation.limits.solids import LinkSolid
 from tauhat.robots.robot import Robot
 
 FAR = 0.1  # [m] beyond the clearance at which nothing is near any more: a margin of one
 _ALWAYS = 0.95  # part of random poses in which links touch that cannot be kept apart
+_SAME = 1e-9  # [m] heights nearer than this are one
 _TOUCHING = 1e-9  # [m] nearer segments than this cross
 _PARALLEL = 1e-12
 
@@ -43,9 +46,13 @@ class DistanceLimit(MotionLimit):
     def kept(self) -> float:
         """The clearance [m]."""
 
+    def gap(self, margin: float) -> float:
+        """Return the distance that a margin means [m], negative where solids overlap."""
+        return self.kept + FAR * margin
+
     def missing(self, row: int, margin: float) -> str:  # noqa: ARG002 - the same for every link
         """Return how much nearer than the clearance."""
-        return f"{-1e3 * margin * FAR:.3g} mm nearer than {1e3 * self.kept:.3g} mm"
+        return f"{-1e3 * margin * FAR:.4g} mm nearer than {1e3 * self.kept:.4g} mm"
 
 
 def check_clearance(clearance: float, where: str) -> None:
@@ -64,9 +71,9 @@ def check_clearance(clearance: float, where: str) -> None:
 class SelfCollision(DistanceLimit):
     """Links that are no neighbours stay clear of each other.
 
-    body : the robot's capsules
+    body : what stands for the robot
     clearance : [m]
-    pairs : (n_c, 2) indices of capsules; links that touch in nearly every pose are left out
+    pairs : (n_c, 2) indices of the body's parts; links that touch in nearly every pose are left out
     """
 
     body: Body
@@ -94,20 +101,19 @@ class SelfCollision(DistanceLimit):
 
     def evaluate(self, motion: Motion) -> tuple[FloatArray, Pull]:
         """Return the distances beyond the clearance, (n_c, n_t), and the pullback through the nearest points."""
-        poses = link_poses(self.body.robot, motion.q)
-        first, second = nearest_points(self.body, poses, self.pairs)
-        gap, away = _between(first, second)
-        radii = self.body.radii[self.pairs].sum(axis=1)[:, None]
+        poses, links = link_poses(self.body.robot, motion.q), self.body.links
+        found = separations(self.body, poses, self.pairs, within=self.clearance + FAR)
+        margins = (np.array([apart.gap for apart in found]).reshape(-1, motion.n_t) - self.clearance) / FAR
 
         def pull(bars: FloatArray) -> MotionGradient:
             wrenches = no_wrenches(self.body.robot, motion.n_t)
-            for row, (a, b) in enumerate(self.pairs):
-                force = (bars[row] / FAR)[:, None] * away[row]
-                wrenches.add(self.body.capsules[a].link, first[row], force)
-                wrenches.add(self.body.capsules[b].link, second[row], -force)
+            for (a, b), apart, margin, bar in zip(self.pairs, found, margins, bars, strict=True):
+                force = np.where(margin < 1.0, bar / FAR, 0.0)[:, None] * apart.away
+                wrenches.add(links[a], apart.first, force)
+                wrenches.add(links[b], apart.second, -force)
             return pulled(self.body.robot, poses, wrenches)
 
-        return (gap - radii - self.clearance) / FAR, pull
+        return np.minimum(margins, 1.0), pull
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,6 +125,7 @@ class HalfSpace(DistanceLimit):
     offset : distance of the plane from the base along the normal [m]
     clearance : [m]
     points : ends of capsules that the joints can move, capsule and place
+    solids : solids whose height the joints can change
     """
 
     body: Body
@@ -127,6 +134,7 @@ class HalfSpace(DistanceLimit):
     offset: float
     clearance: float
     points: tuple[tuple[int, FloatArray], ...] = field(init=False)
+    solids: tuple[LinkSolid, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         check_clearance(self.clearance, self.label)
@@ -136,6 +144,7 @@ class HalfSpace(DistanceLimit):
             raise ExcitationError("a normal of no direction", where=self.label, got=normal.tolist())
         object.__setattr__(self, "normal", read_only(normal / size))
         object.__setattr__(self, "points", self.body.moving_ends())
+        object.__setattr__(self, "solids", _rising(self.body, self.normal))
 
     @property
     def kept(self) -> float:
@@ -149,15 +158,18 @@ class HalfSpace(DistanceLimit):
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The links of the points."""
-        return tuple(self.body.label(index) for index, _ in self.points)
+        """The links of the points and solids."""
+        points = (self.body.label(index) for index, _ in self.points)
+        return (*points, *(solid.label for solid in self.solids))
 
     def evaluate(self, motion: Motion) -> tuple[FloatArray, Pull]:
         """Return the heights beyond the clearance, (n_c, n_t), and their pullback."""
         poses = link_poses(self.body.robot, motion.q)
         links = [self.body.capsules[index].link for index, _ in self.points]
         places = [poses.point(link, place) for link, (_, place) in zip(links, self.points, strict=True)]
-        radii = self.body.radii[[index for index, _ in self.points]][:, None]
+        places += [solid.lowest(poses, self.normal) for solid in self.solids]
+        links += [solid.link for solid in self.solids]
+        radii = np.array([self.body.radii[index] for index, _ in self.points] + [0.0] * len(self.solids))[:, None]
 
         def pull(bars: FloatArray) -> MotionGradient:
             wrenches = no_wrenches(self.body.robot, motion.n_t)
@@ -168,10 +180,34 @@ class HalfSpace(DistanceLimit):
         return (np.array(places) @ self.normal - self.offset - radii - self.clearance) / FAR, pull
 
 
+def _rising(body: Body, normal: FloatArray) -> tuple[LinkSolid, ...]:
+    """Return the solids whose height over a plane depends on the pose: no motion lifts the others."""
+    poses = body.random_poses()
+    return tuple(solid for solid in body.solids if np.ptp(solid.lowest(poses, normal) @ normal) > _SAME)
+
+
 def pulled(robot: Robot, poses: LinkPoses, wrenches: Wrenches) -> MotionGradient:
     """Return wrenches on the links as the gradient with respect to a motion."""
     q = joint_forces(robot, poses, wrenches)
     return MotionGradient(q, np.zeros_like(q), np.zeros_like(q))
+
+
+def separations(body: Body, poses: LinkPoses, pairs: IntArray, *, within: float) -> list[Separation]:
+    """Return how far the parts of each pair are apart; pairs of solids only where they are nearer than `within`."""
+    round_ones = (pairs < len(body.capsules)).all(axis=1)
+    found: dict[int, Separation] = {}
+    if round_ones.any():
+        first, second = nearest_points(body, poses, pairs[round_ones])
+        gap, away = _between(first, second)
+        gap -= body.radii[pairs[round_ones]].sum(axis=1)[:, None]
+        for row, parts in zip(np.flatnonzero(round_ones), zip(gap, away, first, second, strict=True), strict=True):
+            found[int(row)] = Separation(*parts)
+    others = np.flatnonzero(~round_ones)
+    places = {int(index): placed(body.parts[index], poses) for index in np.unique(pairs[others])}
+    for row in others:
+        a, b = (places[int(index)] for index in pairs[row])
+        found[int(row)] = separation(a, b, within=within)
+    return [found[row] for row in range(len(pairs))]
 
 
 def nearest_points(body: Body, poses: LinkPoses, pairs: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -209,9 +245,9 @@ def _between(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _separable_pairs(body: Body, clearance: float) -> IntArray:
-    """Return the pairs of capsules on links that are no neighbours and that some motion can keep apart."""
+    """Return the pairs of parts on links that are no neighbours and that some motion can keep apart."""
     parents = (*body.robot.parents, -1)  # the base is its own parent
-    links = [capsule.link for capsule in body.capsules]
+    links = body.links
     pairs = np.array(
         [
             (a, b)
@@ -222,8 +258,8 @@ def _separable_pairs(body: Body, clearance: float) -> IntArray:
     ).reshape(-1, 2)
     if not len(pairs):
         return pairs
-    gap, _ = _between(*nearest_points(body, body.random_poses(), pairs))
-    touching = (gap < body.radii[pairs].sum(axis=1)[:, None] + clearance).mean(axis=1) > _ALWAYS
+    found = separations(body, body.random_poses(), pairs, within=clearance)
+    touching = np.array([(apart.gap < clearance).mean() for apart in found]) > _ALWAYS
     _warn_of_touching(body, pairs[touching])
     return np.asarray(pairs[~touching])
 
@@ -231,9 +267,9 @@ def _separable_pairs(body: Body, clearance: float) -> IntArray:
 def _warn_of_touching(body: Body, pairs: IntArray) -> None:
     """Tell of links further apart than the next but one that touch in nearly every pose."""
     for a, b in pairs:
-        if abs(_rank(body, body.capsules[a].link) - _rank(body, body.capsules[b].link)) > 2:
+        if abs(_rank(body, body.links[a]) - _rank(body, body.links[b])) > 2:
             warnings.warn(
-                f"self-collision: {body.label(a)} and {body.label(b)} touch in nearly every pose with these radii: the "
+                f"self-collision: {body.label(a)} and {body.label(b)} touch in nearly every pose as they stand: the "
                 "pair is not looked at",
                 TauhatWarning,
                 stacklevel=2,
@@ -241,6 +277,6 @@ def _warn_of_touching(body: Body, pairs: IntArray) -> None:
 
 
 def _rank(body: Body, link: int) -> int:
-    """Return how many links with capsules there are from the base to this one."""
-    bodily = {capsule.link for capsule in body.capsules}
+    """Return how many links with a body there are from the base to this one."""
+    bodily = set(body.links)
     return len(bodily & {-1, *ancestors(body.robot, link)})

@@ -19,12 +19,14 @@ class LimitSet:
     jerk : (n_v,) [rad/s^3 or m/s^3], None where there is no limit
     others : limits of several joints at once; those without rows are dropped
     home : (n_v,) a pose inside all limits around which the search begins [rad or m]; found where not stated
+    start : (n_v,) the pose at which the motion starts and ends [rad or m]; free where not stated
     """
 
     robot: Robot
     jerk: FloatArray | None = None
     others: tuple[MotionLimit, ...] = ()
     home: FloatArray | None = None
+    start: FloatArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "others", tuple(limit for limit in self.others if limit.parts))
@@ -32,7 +34,9 @@ class LimitSet:
         doubled = sorted({name for name in names if names.count(name) > 1})
         if doubled:
             raise ExcitationError("two limits of one name", where="limits", got=", ".join(doubled))
-        for name in ("jerk", "home"):
+        if self.home is not None and self.start is not None:
+            raise ExcitationError("both a home and a start pose", where="limits", remedy="the start pose is enough")
+        for name in ("jerk", "home", "start"):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, frozen(name, value, (self.robot.n_v,), where="limits"))

@@ -1,6 +1,10 @@
 """`limits.toml`: everything that a motion must keep at one place, with every key checked.
 
-home = [0, -1.5, 1.5, 0, 0, 0]          # a pose inside all limits, optional [rad or m]
+home = [0, -1.5, 1.5, 0, 0, 0]          # a pose inside all limits to search around, optional [rad or m]
+
+[start]                                 # instead of home: the pose at which the motion starts and ends
+q = [0, -1.5, 1.5, 0, 0, 0]             # [rad or m]
+unit = "rad"                            # or "deg", of the revolute joints
 
 [joints]                                # each: one number, a list, or a table by joint name; the rest as the robot
 lower = { elbow_joint = -2.0 }          # upper, velocity, acceleration, jerk likewise [rad or m, per s, s^2, s^3]
@@ -16,7 +20,8 @@ speed = 0.5                             # [m/s]
 
 [collision]                             # its presence switches self-collision on
 clearance = 0.02                        # [m], of obstacles too
-radius = 0.07                           # of the links, or a table by joint name and `base` [m]
+geometry = "urdf"                       # the <collision> geometry where there is any; or "capsules" for all links
+radius = 0.07                           # of the capsules, or a table by joint name and `base` [m]
 self = true
 
 [[capsules]]                            # replace those that run from joint to joint
@@ -55,7 +60,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.errors import ArrayError, ExcitationError, RobotError
-from tauhat.excitation.limits.capsules import BASE, Body, Capsule, link_capsules
+from tauhat.excitation.limits.capsules import BASE, Body, Capsule, link_capsules, robot_body
 from tauhat.excitation.limits.cartesian_limit import ToolBox, ToolSpeed, tool_frame
 from tauhat.excitation.limits.collision_limit import HalfSpace, SelfCollision
 from tauhat.excitation.limits.limit_set import LimitSet
@@ -71,7 +76,7 @@ from tauhat.robots.transforms import rotation_from_rpy
 _LARGEST_FILE = 2**20  # [bytes]
 _MOST_OBSTACLES = 100
 _JOINT_KEYS = ("lower", "upper", "velocity", "acceleration")
-_SECTIONS = ("home", "joints", "torque", "tool", "collision", "capsules", "planes", "boxes", "meshes")
+_SECTIONS = ("home", "start", "joints", "torque", "tool", "collision", "capsules", "planes", "boxes", "meshes")
 CLEARANCE = 0.01  # [m] where none is stated
 
 
@@ -127,7 +132,19 @@ def _limit_set(fields: TomlFields, robot: Robot, folder: Path) -> LimitSet:
     frame = tool_frame(held, tool.text("frame") if "frame" in tool.table else None)
     others = (*_torque(fields, held), *_of_tool(tool, held, frame), *_collisions(fields, held, frame, folder))
     home = np.array(fields.row("home", robot.n_v)) if "home" in fields.table else None
-    return LimitSet(robot=held, jerk=jerk, others=others, home=home)
+    return LimitSet(robot=held, jerk=jerk, others=others, home=home, start=_start(fields, robot))
+
+
+def _start(fields: TomlFields, robot: Robot) -> FloatArray | None:
+    if "start" not in fields.table:
+        return None
+    table = fields.subtable("start")
+    table.refuse_unknown(("q", "unit"))
+    pose = np.array(table.row("q", robot.n_v))
+    if table.choice("unit", ("rad", "deg"), "rad") == "rad":
+        return pose
+    revolute = np.array([joint.kind == "revolute" for joint in robot.joints])
+    return np.where(revolute, np.deg2rad(pose), pose)
 
 
 def _with_joint_limits(robot: Robot, fields: TomlFields) -> Robot:
@@ -200,11 +217,14 @@ def _of_tool(fields: TomlFields, robot: Robot, frame: Frame) -> tuple[MotionLimi
 
 def _collisions(fields: TomlFields, robot: Robot, frame: Frame, folder: Path) -> tuple[MotionLimit, ...]:
     table = fields.subtable("collision")
-    table.refuse_unknown(("clearance", "radius", "self"))
+    table.refuse_unknown(("clearance", "geometry", "radius", "self"))
     lists = {key: fields.subtables(key) for key in ("planes", "boxes", "meshes")}
     if sum(map(len, lists.values())) > _MOST_OBSTACLES:
         raise ExcitationError("absurd number of obstacles", where=fields.where, expected=f"<= {_MOST_OBSTACLES}")
-    body = _body(fields, table, robot, frame)
+    given = tuple(_capsule(capsule, robot) for capsule in fields.subtables("capsules"))
+    if "collision" not in fields.table and not any(lists.values()):
+        return ()
+    body = _body(table, robot, frame, given)
     clearance = table.number("clearance", CLEARANCE)
     limits: list[MotionLimit] = [_plane(plane, body, clearance) for plane in lists["planes"]]
     obstacles = [_box(box) for box in lists["boxes"]] + [_mesh(mesh, folder) for mesh in lists["meshes"]]
@@ -221,7 +241,7 @@ def _switch(fields: TomlFields, key: str) -> bool:
     return value
 
 
-def _body(fields: TomlFields, collision: TomlFields, robot: Robot, frame: Frame) -> Body:
+def _body(collision: TomlFields, robot: Robot, frame: Frame, given: tuple[Capsule, ...]) -> Body:
     radius: float | dict[str, float] | None = None
     if "radius" in collision.table:
         value = collision.table["radius"]
@@ -230,8 +250,8 @@ def _body(fields: TomlFields, collision: TomlFields, robot: Robot, frame: Frame)
             radius = {name: radii.number(name) for name in value}
         else:
             radius = collision.number("radius")
-    given = tuple(_capsule(table, robot) for table in fields.subtables("capsules"))
-    return link_capsules(robot, frame, radius=radius, given=given)
+    stated = collision.choice("geometry", ("urdf", "capsules"), "urdf") == "urdf"
+    return (robot_body if stated else link_capsules)(robot, frame, radius=radius, given=given)
 
 
 def _capsule(fields: TomlFields, robot: Robot) -> Capsule:

@@ -43,6 +43,10 @@ class MotionLimit(ABC):
     def missing(self, row: int, margin: float) -> str:
         """Return in words by how much a negative margin of this row exceeds the limit."""
 
+    def at_rest(self) -> str:
+        """Return in words why a pose at rest can miss the limit, where that needs saying."""
+        return ""
+
     def margins(self, motion: Motion) -> FloatArray:
         """Return the margins, (n_c, n_t): >= 0 is allowed, 1 is far away."""
         return self.evaluate(motion)[0]

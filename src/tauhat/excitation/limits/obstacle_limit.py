@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from tauhat.arrays import FloatArray, IntArray, frozen, read_only
+from tauhat.arrays import FloatArray, frozen
 from tauhat.dynamics.motion import Motion, MotionGradient
 from tauhat.errors import ExcitationError
 from tauhat.excitation.limits.capsules import Body
 from tauhat.excitation.limits.collision_limit import FAR, DistanceLimit, check_clearance, pulled
+from tauhat.excitation.limits.distances import PlacedSolid, placed, separation
 from tauhat.excitation.limits.link_poses import link_poses, no_wrenches
 from tauhat.excitation.limits.motion_limit import Pull
-from tauhat.files import existing_file
+from tauhat.excitation.limits.solids import convex_hull
 
 _LARGEST = 1e3  # [m]
-_MOST_BYTES = 200 * 2**20
-_THIN = 1e-9  # [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,25 +83,14 @@ def mesh_obstacle(
     ExcitationError
         when the file is missing, no mesh, flat or absurdly large.
     """
-    import coal
-
-    place = existing_file(path, error=ExcitationError)
-    if place.stat().st_size > _MOST_BYTES:
-        raise ExcitationError("absurd size", where=f"{label}, {place}", expected=f"at most {_MOST_BYTES} bytes")
-    try:
-        mesh = coal.MeshLoader().load(str(place), np.full(3, scale))
-        points = np.array(mesh.vertices(), dtype=np.float64).reshape(-1, 3)
-        if not (np.isfinite(points).all() and np.abs(points).max(initial=0.0) < _LARGEST):
-            raise ExcitationError("absurd size", where=f"{label}, {place}", remedy="is the mesh in millimetres?")
-        mesh.buildConvexHull(True, "Qt")
-    except (ValueError, RuntimeError) as error:
-        reason = str(error).rpartition("message:")[2][:200]
-        raise ExcitationError("not a mesh of a solid", where=f"{label}, {place}", got=reason) from error
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    if (upper - lower).min() < _THIN:
-        raise ExcitationError("a flat mesh is no solid", where=f"{label}, {place}", got=(upper - lower).tolist())
+    shape, corners = convex_hull(path, scale=np.full(3, scale), where=label)
     return Obstacle(
-        label=label, shape=mesh.convex, rotation=rotation, translation=translation, lower=lower, upper=upper
+        label=label,
+        shape=shape,
+        rotation=rotation,
+        translation=translation,
+        lower=corners.min(axis=0),
+        upper=corners.max(axis=0),
     )
 
 
@@ -110,9 +98,9 @@ def mesh_obstacle(
 class ObstacleLimit(DistanceLimit):
     """The links that the joints can move stay clear of a convex solid; margins end at one.
 
-    body : the robot's capsules
+    body : what stands for the robot
     clearance : [m]
-    moving : capsules that are looked at
+    moving : its parts that are looked at
     """
 
     body: Body
@@ -122,7 +110,7 @@ class ObstacleLimit(DistanceLimit):
 
     def __post_init__(self) -> None:
         check_clearance(self.clearance, self.name)
-        object.__setattr__(self, "moving", tuple(sorted({index for index, _ in self.body.moving_ends()})))
+        object.__setattr__(self, "moving", self.body.moving_parts())
 
     @property
     def kept(self) -> float:
@@ -142,58 +130,23 @@ class ObstacleLimit(DistanceLimit):
     def evaluate(self, motion: Motion) -> tuple[FloatArray, Pull]:
         """Return the distances beyond the clearance, (n_c, n_t), and the pullback through the nearest points."""
         poses = link_poses(self.body.robot, motion.q)
-        starts, ends = (np.ascontiguousarray(side) for side in self.body.ends(poses))
-        margins = np.ones((len(self.moving), motion.n_t))
-        away, places = np.zeros((*margins.shape, 3)), np.zeros((*margins.shape, 3))
-        for row, index in enumerate(self.moving):
-            near = self._near(starts[index], ends[index], index)
-            gap, away[row, near], places[row, near] = self._distances(starts[index, near], ends[index, near], index)
-            margins[row, near] = np.minimum((gap - self.clearance) / FAR, 1.0)
+        standing = self._standing(motion.n_t)
+        moving = [self.body.parts[index] for index in self.moving]
+        found = [separation(placed(part, poses), standing, within=self.clearance + FAR) for part in moving]
+        margins = np.minimum([(apart.gap - self.clearance) / FAR for apart in found], 1.0)
 
         def pull(bars: FloatArray) -> MotionGradient:
             wrenches = no_wrenches(self.body.robot, motion.n_t)
-            for row, index in enumerate(self.moving):
-                force = np.where(margins[row] < 1.0, bars[row] / FAR, 0.0)[:, None] * away[row]
-                wrenches.add(self.body.capsules[index].link, places[row], force)
+            for part, apart, margin, bar in zip(moving, found, margins, bars, strict=True):
+                force = np.where(margin < 1.0, bar / FAR, 0.0)[:, None] * apart.away
+                wrenches.add(part.link, apart.first, force)
             return pulled(self.body.robot, poses, wrenches)
 
         return margins, pull
 
-    def _near(self, start: FloatArray, end: FloatArray, index: int) -> IntArray:
-        """Return the samples (n,) at which the capsule may be within reach: none of the solid's axes separates them."""
-        a, b = ((side - self.obstacle.translation) @ self.obstacle.rotation for side in (start, end))
-        reach = self.body.capsules[index].radius + self.clearance + FAR
-        lowest, highest = np.minimum(a, b) - reach, np.maximum(a, b) + reach
-        return np.flatnonzero(((lowest < self.obstacle.upper) & (highest > self.obstacle.lower)).all(axis=1))
-
-    def _distances(self, start: FloatArray, end: FloatArray, index: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return distance (n,), direction from the solid (n, 3) and nearest point of the link (n, 3) by coal."""
-        import coal
-
-        capsule = self.body.capsules[index]
-        shape = coal.Capsule(capsule.radius, capsule.length)
-        solid = coal.Transform3s(np.array(self.obstacle.rotation), np.array(self.obstacle.translation))
-        request, result = coal.DistanceRequest(True), coal.DistanceResult()
-        request.enable_signed_distance = True
-        request.gjk_tolerance = request.epa_tolerance = _TOLERANCE
-        gap, away, places = np.empty(len(start)), np.empty((len(start), 3)), np.empty((len(start), 3))
-        centres = 0.5 * (start + end)
-        for sample, turn in enumerate(_turns_to(end - start)):
-            result.clear()
-            pose = coal.Transform3s(turn, centres[sample])
-            gap[sample] = coal.distance(shape, pose, self.obstacle.shape, solid, request, result)
-            away[sample], places[sample] = -result.normal, result.getNearestPoint1()
-        return gap, away, places
-
-
-_TOLERANCE = 1e-9
-
-
-def _turns_to(along: FloatArray) -> FloatArray:
-    """Return rotations (n, 3, 3) whose third column points along each row, (n, 3); any where a row is zero."""
-    size = np.linalg.norm(along, axis=1, keepdims=True)
-    third = np.where(size > _THIN, along / np.maximum(size, _THIN), np.array([0.0, 0.0, 1.0]))
-    helper = np.where(np.abs(third[:, :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-    first = np.cross(helper, third)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return read_only(np.stack([first, np.cross(third, first), third], axis=2))
+    def _standing(self, n_t: int) -> PlacedSolid:
+        solid = self.obstacle
+        rotation = np.broadcast_to(solid.rotation, (n_t, 3, 3))
+        return PlacedSolid(
+            solid.shape, rotation, np.broadcast_to(solid.translation, (n_t, 3)), solid.lower, solid.upper
+        )

@@ -82,6 +82,10 @@ class TorqueLimit(MotionLimit):
 
         return 1.0 - (np.abs(tau) + friction) / size, pull
 
+    def at_rest(self) -> str:
+        """Return what needs torque at rest."""
+        return "gravity and friction alone need that in the best pose"
+
     def missing(self, row: int, margin: float) -> str:
         """Return the torque needed and given."""
         joint = int(self.joints[row])
