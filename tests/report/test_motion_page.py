@@ -14,8 +14,8 @@ from sample_arms import planar_truth
 from tauhat.dynamics import torque_model
 from tauhat.dynamics.motion import Motion
 from tauhat.errors import ExcitationError
-from tauhat.excitation import FourierSeries, information, motion_limits, random_fourier
-from tauhat.report import write_motion_report
+from tauhat.excitation import FourierSeries, SampledMotion, information, motion_limits, random_fourier
+from tauhat.report import write_motion_report, write_report
 from tauhat.report.motion_case import MotionCase, motion_case
 from tauhat.robots import Robot
 
@@ -32,7 +32,7 @@ def series(arm: Robot) -> FourierSeries:
 
 @pytest.fixture(scope="module")
 def case(arm: Robot, series: FourierSeries) -> MotionCase:
-    return motion_case(arm, series, terms="inertia,viscous,coulomb", limits=None, margins=None)
+    return motion_case(arm, series, counted=information(torque_model(arm, "inertia,viscous,coulomb")))
 
 
 def test_singular_values_and_deviations_are_those_of_the_stacked_scaled_regressor(arm, series, case):
@@ -65,6 +65,30 @@ def test_the_page_holds_a_drawing_a_joint_between_its_limits(tmp_path: Path, arm
     assert lines[:4] == [limits.lower[1], limits.upper[1], -limits.velocity[1], limits.velocity[1]]
     assert "table &lt;b&gt;" in text
     assert "table <b>" not in text
+
+
+def test_the_page_says_that_a_motion_comes_to_rest_only_where_it_does(tmp_path: Path, arm, series):
+    whole = write_motion_report(tmp_path / "m.html", arm, series).read_text(encoding="utf-8")
+    assert "starts and ends at rest, and may be repeated" in whole
+    t = np.linspace(0.0, 5.0, 200)  # of a period of eight seconds
+    cut = SampledMotion(samples=series.sample(t))
+    text = write_motion_report(tmp_path / "m.html", arm, cut).read_text(encoding="utf-8")
+    assert "may be repeated" not in text
+    assert "does not start and end at rest" in text
+
+
+def test_a_report_on_an_estimate_takes_the_motion_in(tmp_path: Path, verified):
+    estimate, verification = verified
+    motion = random_fourier(estimate.robot, period=6.0, harmonics=3, rng=np.random.default_rng(0))
+    plain = write_report(tmp_path / "r.html", estimate, verification=verification).read_text(encoding="utf-8")
+    text = write_report(tmp_path / "m.html", estimate, verification=verification, motion=motion).read_text(
+        encoding="utf-8"
+    )
+    keys = re.findall(r'id="data-([a-z0-9-]+)"', text)
+    assert len(keys) == len(set(keys))
+    assert set(keys) - set(re.findall(r'id="data-([a-z0-9-]+)"', plain)) == {"joint-0", "joint-1", "seen", "spectrum"}
+    assert f"shows {estimate.base.n_b} parameters" in text
+    assert HOSTILE_JOINT not in text
 
 
 def test_hostile_joint_names_stay_text(tmp_path: Path, verified):

@@ -1,4 +1,4 @@
-"""Simulated experiments as the command line runs them: a random motion of a robot that is not its data sheet."""
+"""Simulated experiments as the command line runs them: a motion of a robot that is not its data sheet."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from tauhat.dynamics.base import base_parameters
 from tauhat.dynamics.model import torque_model
 from tauhat.errors import SimulationError
 from tauhat.excitation.fourier import random_fourier
+from tauhat.excitation.trajectory import Trajectory
 from tauhat.files import write_text
 from tauhat.recordings.writing import write_recording
 from tauhat.robots.robot import Robot
 from tauhat.simulation.experiment import ExperimentSettings, Simulation, simulate
 from tauhat.simulation.parameters import TrueParameters
 from tauhat.simulation.sensors import SensorErrors
+from tauhat.simulation.truth_file import plant_document
 from tauhat.verification.truth import standard_parameters
 
 _SLOWEST_CONTROL = 2000.0  # [Hz]
@@ -30,9 +32,9 @@ _MOST_SAMPLES = 5_000_000  # of one log: a few gigabytes
 class Plan:
     """How a log is made.
 
-    seconds : length of the motion, one period of a Fourier series [s]
+    seconds : length of the motion; of a random one, the period of its Fourier series [s]
     rate : samples per second of the log [Hz]
-    harmonics : of the motion
+    harmonics : of a random motion
     noise : of the torque, as a fraction of each joint's RMS torque
     quantisation : step of the encoders on the joint side [rad or m]
     """
@@ -62,9 +64,12 @@ class Plan:
         )
 
 
-def run_experiment(robot: Robot, plan: Plan, *, truth: TrueParameters, rng: np.random.Generator) -> Simulation:
-    """Return a log of the robot following a random motion inside its limits, with its truth."""
-    motion = random_fourier(robot, period=plan.seconds, harmonics=plan.harmonics, rng=rng)
+def run_experiment(
+    robot: Robot, plan: Plan, *, truth: TrueParameters, rng: np.random.Generator, motion: Trajectory | None = None
+) -> Simulation:
+    """Return a log of the robot following a motion, with its truth; by default a random one inside its limits."""
+    if motion is None:
+        motion = random_fourier(robot, period=plan.seconds, harmonics=plan.harmonics, rng=rng)
     return simulate(robot, motion, rng=rng, parameters=truth, settings=plan.settings)
 
 
@@ -89,13 +94,13 @@ def write_experiment(robot: Robot, simulation: Simulation, log: Path, *, plan: P
 
 
 def truth_document(robot: Robot, truth: TrueParameters) -> dict[str, Any]:
-    """Return the true standard and base parameters as plain data."""
+    """Return the plant, and its standard and base parameters in the plain model, as plain data."""
     model = torque_model(robot)
     base = base_parameters(model)
     values = standard_parameters(model, truth)
     standard = zip(model.parameters, values.tolist(), strict=True)
     kept = zip(base.independent, base.formulas(), (base.projection @ values).tolist(), strict=True)
-    return {
+    return plant_document(truth) | {
         "robot": robot.name,
         "parameters": [{"name": known.name, "value": value, "unit": known.unit} for known, value in standard],
         "base_parameters": [

@@ -15,6 +15,8 @@ from tauhat.verification.prediction import JointError, LogPrediction
 _NOTICEABLE = GRADES[1].below  # joints better than this need no advice
 _OVERFITTED = 2.0  # unseen error over fit error
 _CONCENTRATED = 1.6  # error in some part of the motion over the error elsewhere
+_MODERATE = 0.1  # of the top speed, where friction is looked at
+_STANDARD_ERRORS = 3.0  # by which it must be negative
 _MOSTLY_CONSTANT = 0.7  # mean error over rms error
 
 
@@ -35,22 +37,18 @@ def worst_joint(logs: tuple[LogPrediction, ...]) -> tuple[LogPrediction, int] | 
 
 def _sign(case: Case) -> str:
     estimate = case.estimate
-    parameters = estimate.model.parameters
-    surely_negative = (estimate.values < 0) & (relative_halves(estimate) < 1)
-    joints = {
-        parameters[index].joint
-        for index, negative in zip(estimate.base.independent, surely_negative, strict=True)
-        if negative and parameters[index].symbol == "Fc"
-    }
-    if not joints:
+    limits = estimate.robot.velocity_limit
+    friction = estimate.friction(_MODERATE * np.where(np.isfinite(limits) & (limits > 0.0), limits, 1.0))
+    surely_negative = friction.torque < -_STANDARD_ERRORS * friction.standard_errors
+    if not surely_negative.any():
         return ""
-    names = ", ".join(estimate.robot.joint_names[joint] for joint in sorted(joints))
-    return f"Check the sign of the torque of {names}: Coulomb friction comes out negative, which no gear does."
+    names = ", ".join(estimate.robot.joint_names[joint] for joint in np.flatnonzero(surely_negative))
+    return f"Check the sign of the torque of {names}: friction comes out negative, which no gear does."
 
 
 def _motion(case: Case) -> str:
     estimate = case.estimate
-    if estimate.rank < estimate.base.n_b:
+    if estimate.rank < estimate.n_fitted:
         return (
             f"Record a richer motion: this one determines only {estimate.rank} of {estimate.base.n_b} parameters. "
             "Move all joints at once, over more of their range, at different speeds."

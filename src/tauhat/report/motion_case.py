@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from tauhat.dynamics.base import random_motion
 from tauhat.dynamics.model import torque_model
 from tauhat.dynamics.motion import Motion
 from tauhat.errors import ExcitationError
-from tauhat.excitation.information import information
+from tauhat.excitation.information import Information, information
 from tauhat.excitation.limits import MotionLimits, motion_limits
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
 from tauhat.robots.robot import Robot
@@ -20,6 +20,7 @@ from tauhat.robots.robot import Robot
 _SAMPLES = 2000
 _STATES = 10_000
 _SEED = 20261121
+_STILL = 1e-6  # of the limits: slower than this at both ends, and as near to the start at the end, is at rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -33,6 +34,7 @@ class MotionCase:
     names, joints : (n,) parameters that are judged, and the joint of each
     singular, singular_random : (n,) singular values of the scaled regressor over sqrt(N), largest first
     deviations, deviations_random : (n,) standard deviation of each scaled parameter at unit torque noise, times sqrt(N)
+    rests : whether the motion starts and ends at rest in one pose, so that it may be repeated
     """
 
     robot: Robot
@@ -45,6 +47,7 @@ class MotionCase:
     singular_random: FloatArray
     deviations: FloatArray
     deviations_random: FloatArray
+    rests: bool
 
     def __post_init__(self) -> None:
         for name in ("singular", "singular_random", "deviations", "deviations_random"):
@@ -72,19 +75,25 @@ def motion_case(
     robot: Robot,
     trajectory: Trajectory,
     *,
-    terms: str | Iterable[str],
-    limits: MotionLimits | None,
-    margins: Mapping[str, float] | None,
+    counted: Information | None = None,
+    limits: MotionLimits | None = None,
+    margins: Mapping[str, float] | None = None,
 ) -> MotionCase:
     """Return what a page tells about a motion.
+
+    Parameters
+    ----------
+    counted : columns that are judged; those of the plain terms by default
+    limits : of the joints; the robot's own by default
+    margins : unused parts of limits by their names
 
     Raises
     ------
     ExcitationError
         when the motion leaves a parameter without excitation.
     """
-    model = torque_model(robot, terms)
-    facts = information(model)
+    facts = counted or information(torque_model(robot))
+    model, room = facts.model, limits or motion_limits(robot)
     samples = trajectory.sample(np.linspace(0.0, trajectory.duration, _SAMPLES, endpoint=False))
     rows = [np.ascontiguousarray(part.T) for part in (samples.q, samples.dq, samples.ddq)]
     singular, deviations = _spectrum(facts.matrix(Motion(q=rows[0], dq=rows[1], ddq=rows[2])), robot)
@@ -92,7 +101,7 @@ def motion_case(
     singular_random, deviations_random = _spectrum(facts.matrix(states), robot)
     return MotionCase(
         robot=robot,
-        limits=limits or motion_limits(robot),
+        limits=room,
         samples=samples,
         margins=margins or {},
         names=tuple(model.parameters[index].name for index in facts.columns),
@@ -101,7 +110,18 @@ def motion_case(
         singular_random=singular_random,
         deviations=deviations,
         deviations_random=deviations_random,
+        rests=_rests(trajectory, room),
     )
+
+
+def _rests(trajectory: Trajectory, limits: MotionLimits) -> bool:
+    ends = trajectory.sample(np.array([0.0, trajectory.duration]))
+    parts = (
+        np.abs(ends.q[1] - ends.q[0]) / (limits.upper - limits.lower),
+        np.abs(ends.dq) / limits.velocity,
+        np.abs(ends.ddq) / limits.acceleration,
+    )
+    return all(float(part.max()) <= _STILL for part in parts)
 
 
 def _spectrum(matrix: FloatArray, robot: Robot) -> tuple[FloatArray, FloatArray]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from tauhat.dynamics.model import PLAIN_TERMS
 from tauhat.errors import MissingExtraError
 from tauhat.estimation.estimate import Estimate
+from tauhat.excitation.information import Information, information, with_exact_sign
 from tauhat.excitation.limits import MotionLimits
 from tauhat.excitation.trajectory import Trajectory
 from tauhat.files import write_text
@@ -30,6 +30,7 @@ def write_report(
     *,
     verification: Verification | None = None,
     findings: Findings | None = None,
+    motion: Trajectory | None = None,
     title: str | None = None,
 ) -> Path:
     """Write a self-contained HTML report about an estimate and return its path; the file appears whole or not at all.
@@ -38,22 +39,30 @@ def write_report(
     ----------
     verification : predictions to draw; without them the report shows the fit's figures alone
     findings : what checks of the logs said, all together or by the name of the log; None when none was made
+    motion : that the logs were made with; adds chapters on its limits and on what it identifies
     title : heading; the robot's name by default
 
     Raises
     ------
     MissingExtraError
         when plotly or jinja2 is not installed.
+    ExcitationError
+        when the motion leaves a parameter without excitation.
     OutputError
         when the file cannot be written.
     """
     _require_libraries()
     from tauhat.report.case import Case
-    from tauhat.report.sections import SECTIONS
+    from tauhat.report.motion_case import motion_case
+    from tauhat.report.sections import MOTION_SECTIONS, SECTIONS
 
     case = Case(estimate=estimate, verification=verification, findings=_by_log(findings))
+    sections = [section(case) for section in SECTIONS]
+    if motion is not None:
+        moved = motion_case(estimate.robot, motion, counted=information(with_exact_sign(estimate.model)))
+        sections += [section(moved) for section in MOTION_SECTIONS]
     heading = title or f"{estimate.robot.name}: identified torque model"
-    write_text(path, _page([section(case) for section in SECTIONS], title=heading, version=estimate.version))
+    write_text(path, _page(sections, title=heading, version=estimate.version))
     return Path(path)
 
 
@@ -62,7 +71,7 @@ def write_motion_report(
     robot: Robot,
     trajectory: Trajectory,
     *,
-    terms: str | Iterable[str] = PLAIN_TERMS,
+    counted: Information | None = None,
     limits: MotionLimits | None = None,
     margins: Mapping[str, float] | None = None,
 ) -> Path:
@@ -70,7 +79,7 @@ def write_motion_report(
 
     Parameters
     ----------
-    terms : of the torque model whose parameters are judged
+    counted : columns that are judged; those of the plain terms by default
     limits : of the joints; the robot's own by default
     margins : unused parts of all limits, further ones too, as `Design.margins` has them
 
@@ -86,7 +95,7 @@ def write_motion_report(
     from tauhat.report.motion_case import motion_case
     from tauhat.report.sections import MOTION_SECTIONS
 
-    case = motion_case(robot, trajectory, terms=terms, limits=limits, margins=margins)
+    case = motion_case(robot, trajectory, counted=counted, limits=limits, margins=margins)
     sections = [section(case) for section in MOTION_SECTIONS]
     write_text(path, _page(sections, title=f"{robot.name}: designed motion", version=__version__))
     return Path(path)

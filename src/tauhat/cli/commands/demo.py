@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tauhat.cli.demo import Demo
 
 _OWN_ROBOT = (
+    ("a motion for it", "tauhat excite my_robot.urdf -o motion.parquet"),
     ("is my log sound?", "tauhat check my_log.csv --map my_map.toml --robot my_robot.urdf"),
     ("identify", "tauhat identify my_robot.urdf my_log.csv --map my_map.toml -o mine.json"),
     ("verify on another log", "tauhat verify mine.json other_log.csv --map my_map.toml"),
@@ -55,10 +56,24 @@ def _view(demo: Demo) -> Iterator[RenderableType]:
     from tauhat.cli.views.estimate import estimate_view
     from tauhat.cli.views.verification import verification_view
 
+    yield _motion(demo)
     yield from estimate_view(demo.estimate)
     yield from verification_view(demo.verification)
     yield _against_truth(demo)
     yield _next_steps(demo)
+
+
+def _motion(demo: Demo) -> Text:
+    from rich.text import Text
+
+    from tauhat.cli.views.motion import condition_alone
+
+    found = demo.designed
+    return Text.assemble(
+        ("The motion", "bold"),
+        f" was designed in {found.seconds:.1f} s: {condition_alone(found.condition)}; the random one that the model is "
+        f"verified on has {demo.random_condition:.1f}. Inside the joint limits at all times, from rest to rest.\n",
+    )
 
 
 def _against_truth(demo: Demo) -> Text:
@@ -69,7 +84,7 @@ def _against_truth(demo: Demo) -> Text:
     compared = demo.comparison
     return Text.assemble(
         ("Against the truth", "bold"),
-        f", which only a simulation knows: on the second motion the model misses {percent(compared.relative_rms)} of "
+        f", which only a simulation knows: on the random motion the model misses {percent(compared.relative_rms)} of "
         f"the noise-free torque; the 95 % intervals of {int(compared.inside.sum())} of {compared.inside.size} base "
         f"parameters ({percent(compared.share_inside)}) hold the true value.\n",
     )
@@ -81,7 +96,10 @@ def _next_steps(demo: Demo) -> Text:
     text = Text.assemble(
         (f"Done in {demo.seconds:.0f} s. Open the report: ", ""), (str(demo.files["report"]), "bold cyan"), "\n"
     )
-    text.append(f"Logs, truth and estimate are beside it in {demo.folder}.\n\nWith your own robot:\n")
+    text.append(
+        f"Motion (tauhat view shows it), logs, truth and estimate are beside it in {demo.folder}.\n\n"
+        "With your own robot:\n"
+    )
     for purpose, command in _OWN_ROBOT:
         text.append(f"  # {purpose}\n", style="dim").append(f"  {command}\n", style="cyan")
     return text

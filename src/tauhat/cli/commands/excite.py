@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,7 +28,11 @@ class Options:
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="MOTION", help="Motion to write: .parquet, .csv or .csv.gz.", show_default=False
+            "-o",
+            "--output",
+            metavar="MOTION",
+            help="Motion to write: .parquet, .csv, .csv.gz, or .script for a Universal Robots program.",
+            show_default=False,
         ),
     ]
     seconds: Annotated[float, typer.Option("--seconds", min=0.5, max=600.0, help="Length of one period (s).")] = 10.0
@@ -36,6 +40,16 @@ class Options:
     rate: Annotated[
         float, typer.Option("--rate", min=1.0, max=10_000.0, help="Samples per second of the motion file (Hz).")
     ] = 100.0
+    periods: Annotated[int, typer.Option("--periods", min=1, max=10_000, help="How often the written motion runs.")] = 1
+    motions: Annotated[
+        int,
+        typer.Option(
+            "--motions",
+            min=1,
+            max=100,
+            help="How many motions, each for what those before leave uncertain: MOTION-1 ..",
+        ),
+    ] = 1
     criterion: Annotated[
         str, typer.Option("--criterion", metavar="NAME", help="mixed, condition, d, a or e (optimal).")
     ] = "mixed"
@@ -66,6 +80,9 @@ class Options:
             "--after", metavar="ESTIMATE.json", help="Design for what this estimate is unsure of.", show_default=False
         ),
     ] = None
+    payload: Annotated[
+        bool, typer.Option("--payload", help="Design for the inertia of the last link alone: what it carries.")
+    ] = False
     model: ModelOption = TERM_NAMES
     lock: LockOption = None
     seed: SeedOption = 0
@@ -74,14 +91,31 @@ class Options:
 
 def run(options: Options) -> None:
     """Design a motion that identifies a robot well and keeps its limits at all times."""
-    import numpy as np
-
-    from tauhat.excitation import DesignSettings, criterion_named, design, load_limits, method_named
-    from tauhat.recordings.writing import write_recording
+    from tauhat.cli.motions import check_motion_output, numbered, write_motion
     from tauhat.robots.library import load_robot
 
     robot = load_robot(options.robot, locked=options.lock)
-    settings = DesignSettings(
+    paths = numbered(options.output, options.motions)
+    for path in paths:
+        check_motion_output(path, robot)
+    settings = _settings(options, robot)
+    designs = _designs(robot, settings, options)
+    for found, path in zip(designs, paths, strict=True):
+        write_motion(found, robot, path, rate=options.rate, periods=options.periods)
+    if options.report is not None:
+        _write_pages(numbered(options.report, options.motions), robot, settings, designs, terms=options.model)
+    distances = frozenset[str]() if settings.limits is None else settings.limits.distances
+    document = _document(robot, designs, paths, seed=options.seed)
+    show(document, lambda: _view(document, options, distances), as_json=options.as_json)
+
+
+def _settings(options: Options, robot: Robot) -> DesignSettings:
+    from tauhat.excitation import DesignSettings, information, load_limits, method_named, payload_information
+
+    if options.payload and options.after is not None:
+        message = "an estimate of the whole arm says nothing about a payload: leave out one of --payload and --after"
+        raise typer.BadParameter(message, param_hint="'--payload'")
+    return DesignSettings(
         period=options.seconds,
         harmonics=options.harmonics,
         method=method_named(options.method),
@@ -89,23 +123,8 @@ def run(options: Options) -> None:
         margin=options.margin,
         limits=None if options.limits is None else load_limits(options.limits, robot),
         after=None if options.after is None else _knowledge(options.after, robot),
+        counted=payload_information if options.payload else information,
     )
-    criterion = criterion_named(options.criterion)
-    with searching(f"a motion for {robot.name}", settings.genetic.generations) as progress:
-        found = design(
-            robot,
-            rng=np.random.default_rng(options.seed),
-            criterion=criterion,
-            settings=settings,
-            terms=options.model,
-            progress=progress,
-        )
-    write_recording(found.recording(rate=options.rate, joint_names=robot.joint_names), options.output)
-    if options.report is not None:
-        _write_page(options.report, settings, robot, found, terms=options.model)
-    document = {"motion": str(options.output), "robot": robot.name, "seed": options.seed, **found.to_dict()}
-    distances = frozenset[str]() if settings.limits is None else settings.limits.distances
-    show(document, lambda: _view(document, found, distances), as_json=options.as_json)
 
 
 def _knowledge(path: Path, robot: Robot) -> Knowledge:
@@ -115,33 +134,72 @@ def _knowledge(path: Path, robot: Robot) -> Knowledge:
     estimate = load_estimate(path)
     estimate.check_robot(robot)
     return Knowledge(
-        columns=estimate.base.independent,
+        names=tuple(estimate.base.names[index] for index in estimate.base.independent),
         covariance=estimate.covariance,
         torque_noise=estimate.joint_rms,
         rows_per_second=2.0 * estimate.processing.cutoff,
     )
 
 
-def _write_page(path: Path, settings: DesignSettings, robot: Robot, found: Design, *, terms: str) -> None:
+def _designs(robot: Robot, settings: DesignSettings, options: Options) -> tuple[Design, ...]:
+    """Return the motions, each designed for what the ones before it leave uncertain."""
+    import numpy as np
+
+    from tauhat.excitation import criterion_named, design
+
+    rng, criterion = np.random.default_rng(options.seed), criterion_named(options.criterion)
+    designs: list[Design] = []
+    for number in range(1, options.motions + 1):
+        which = f"motion {number} of {options.motions}" if options.motions > 1 else "a motion"
+        earlier = tuple(found.trajectory for found in designs)
+        with searching(f"{which} for {robot.name}", settings.genetic.generations) as progress:
+            found = design(
+                robot,
+                rng=rng,
+                criterion=criterion,
+                settings=replace(settings, earlier=earlier),
+                terms=options.model,
+                progress=progress,
+            )
+        designs.append(found)
+    return tuple(designs)
+
+
+def _write_pages(
+    paths: Sequence[Path], robot: Robot, settings: DesignSettings, designs: Sequence[Design], *, terms: str
+) -> None:
+    from tauhat.dynamics.model import torque_model
     from tauhat.report.page import write_motion_report
 
     limits = None if settings.limits is None else settings.limits.of_joints()
+    counted = settings.counted(torque_model(robot, terms))
     with working("drawing"):
-        write_motion_report(path, robot, found.trajectory, terms=terms, limits=limits, margins=found.margins)
+        for path, found in zip(paths, designs, strict=True):
+            margins = found.margins
+            write_motion_report(path, robot, found.trajectory, counted=counted, limits=limits, margins=margins)
 
 
-def _view(document: dict[str, Any], found: Design, distances: frozenset[str]) -> Iterator[RenderableType]:
-    from tauhat.cli.views.tables import table
-    from tauhat.excitation import FAR
+def _document(robot: Robot, designs: Sequence[Design], paths: Sequence[Path], *, seed: int) -> dict[str, Any]:
+    """Return the figures: those of the last motion count all before it, times add up, margins are the smallest."""
+    together = designs[-1].to_dict() | {
+        "mean_error_before": designs[0].mean_error_before,
+        "seconds": sum(found.seconds for found in designs),
+        "evaluations": sum(found.evaluations for found in designs),
+        "limits": {name: min(found.margins[name] for found in designs) for name in designs[0].margins},
+    }
+    motions = [{"motion": str(path), **found.to_dict()} for path, found in zip(paths, designs, strict=True)]
+    return {"motion": str(paths[0]), "robot": robot.name, "seed": seed, **together, "motions": motions}
 
-    made = table("Limits", ("limit",), ("left unused",))
-    for name, margin in found.margins.items():
-        beyond = f"{1e3 * FAR * margin:.0f} mm{' or more' if margin >= 1.0 else ''} beyond the clearance"
-        made.add_row(name, beyond if name in distances else f"{100 * margin:.1f} %")
-    yield (
-        f"Condition number {found.condition:.2f} (columns scaled by constants; good: below 10), log det "
-        f"{found.log_det:.1f}, found in {found.seconds:.1f} s with {found.evaluations} evaluations."
-    )
-    yield made
-    yield "The motion starts and ends at rest, and may be repeated without a pause."
-    yield unbroken(f"Written: {document['motion']}")
+
+def _view(document: dict[str, Any], options: Options, distances: frozenset[str]) -> Iterator[RenderableType]:
+    from rich.text import Text
+
+    from tauhat.cli.views.motion import limits_table, motions_table, quality
+
+    yield Text(quality(document, after=None if options.after is None else options.after.name))
+    if options.motions > 1:
+        yield motions_table(document["motions"])
+    yield limits_table(document["limits"], distances)
+    yield "Every run starts and ends at rest in one pose, and may be repeated without a pause."
+    for motion in document["motions"]:
+        yield unbroken(f"Written: {motion['motion']}")

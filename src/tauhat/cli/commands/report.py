@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tauhat.cli.options import CutoffOption, EstimateArgument, JsonOption, MapOption, RowsOption
+from tauhat.cli.options import CutoffOption, EstimateArgument, JsonOption, MapOption, MotionOption, RowsOption
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
 
@@ -33,21 +33,25 @@ class Options:
     map_file: MapOption = None
     cutoff: CutoffOption = None
     rows: RowsOption = None
+    motion: MotionOption = None
     as_json: JsonOption = False
 
 
 def run(options: Options) -> None:
     """Write a self-contained HTML report: health of the logs, prediction, parameters with error bars."""
+    from tauhat.cli.motions import motion_for
     from tauhat.estimation.estimate import load_estimate
     from tauhat.files import check_output
     from tauhat.report.page import write_report
 
     estimate = load_estimate(options.estimate)
-    check_output(options.output, inputs=[options.estimate, *(options.logs or ())])
+    given = [options.estimate, *(options.logs or ()), *([options.motion] if options.motion else ())]
+    check_output(options.output, inputs=given)
+    motion = None if options.motion is None else motion_for(estimate.robot, options.motion)
     with working("checking and predicting"):
         verification, findings = _verified(estimate, options) if options.logs else (None, None)
     with working("drawing"):
-        write_report(options.output, estimate, verification=verification, findings=findings)
+        write_report(options.output, estimate, verification=verification, findings=findings, motion=motion)
     document = {
         "report": str(options.output),
         "robot": estimate.robot.name,

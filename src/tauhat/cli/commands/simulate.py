@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tauhat.cli.options import JsonOption, LockOption, RobotArgument, SeedOption
+from tauhat.cli.options import JsonOption, LockOption, MotionOption, RobotArgument, SeedOption
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
+    from tauhat.cli.experiment import Plan
+    from tauhat.excitation.trajectory import Trajectory
     from tauhat.recordings.recording import Recording
 
 
@@ -31,11 +33,18 @@ class Options:
             "-o", "--output", metavar="LOG", help="Log to write: .parquet, .csv or .csv.gz.", show_default=False
         ),
     ]
-    seconds: Annotated[float, typer.Option("--seconds", min=1.0, max=3600.0, help="Length of the motion (s).")] = 20.0
+    motion: MotionOption = None
+    seconds: Annotated[
+        float | None,
+        typer.Option("--seconds", min=1.0, max=3600.0, help="Length of the random motion (s).", show_default="20"),
+    ] = None
     rate: Annotated[
         float, typer.Option("--rate", min=10.0, max=10_000.0, help="Samples per second of the log (Hz).")
     ] = 500.0
-    harmonics: Annotated[int, typer.Option("--harmonics", min=2, max=50, help="Harmonics of the random motion.")] = 5
+    harmonics: Annotated[
+        int | None,
+        typer.Option("--harmonics", min=2, max=50, help="Harmonics of the random motion.", show_default="5"),
+    ] = None
     noise: Annotated[
         float, typer.Option("--noise", min=0.0, max=10.0, help="Torque noise over each joint's RMS torque.")
     ] = 0.02
@@ -58,10 +67,11 @@ class Options:
 
 
 def run(options: Options) -> None:
-    """Simulate a robot on a random motion; write its log, and its true parameters beside it."""
+    """Simulate a robot on a designed or a random motion; write its log, and its true parameters beside it."""
     import numpy as np
 
-    from tauhat.cli.experiment import Plan, run_experiment, write_experiment
+    from tauhat.cli.experiment import run_experiment, write_experiment
+    from tauhat.cli.motions import motion_for
     from tauhat.files import check_output
     from tauhat.recordings.writing import log_ending
     from tauhat.robots.library import load_robot
@@ -69,27 +79,38 @@ def run(options: Options) -> None:
 
     robot = load_robot(options.robot, locked=options.lock)
     log_ending(options.output)
-    check_output(options.output, inputs=[options.robot])
-    rng = np.random.default_rng(options.seed)
-    plan = Plan(
-        seconds=options.seconds,
-        rate=options.rate,
-        harmonics=options.harmonics,
-        noise=options.noise,
-        quantisation=options.quantisation,
-    )
-    with working(f"simulating {options.seconds:g} s of {robot.name}"):
+    check_output(options.output, inputs=[options.robot, *([options.motion] if options.motion else ())])
+    motion = None if options.motion is None else motion_for(robot, options.motion)
+    plan = _plan(options, motion)
+    with working(f"simulating {plan.seconds:g} s of {robot.name}"):
         truth = perturbed(robot, np.random.default_rng(options.robot_seed), spread=options.spread)
-        simulation = run_experiment(robot, plan, truth=truth, rng=rng)
+        rng = np.random.default_rng(options.seed)
+        simulation = run_experiment(robot, plan, truth=truth, rng=rng, motion=motion)
         beside = write_experiment(robot, simulation, options.output, plan=plan, seed=options.seed)
     document = _document(simulation.recording, options, beside)
     show(document, lambda: _view(document, options), as_json=options.as_json)
+
+
+def _plan(options: Options, motion: Trajectory | None) -> Plan:
+    from tauhat.cli.experiment import Plan
+
+    if motion is not None and (options.seconds, options.harmonics) != (None, None):
+        raise typer.BadParameter("has its own length: leave out --seconds and --harmonics", param_hint="'--motion'")
+    whole = Plan()
+    return Plan(
+        seconds=motion.duration if motion is not None else options.seconds or whole.seconds,
+        rate=options.rate,
+        harmonics=options.harmonics or whole.harmonics,
+        noise=options.noise,
+        quantisation=options.quantisation,
+    )
 
 
 def _document(recording: Recording, options: Options, truth: Path) -> dict[str, Any]:
     return {
         "log": str(options.output),
         "truth": str(truth),
+        "motion": None if options.motion is None else str(options.motion),
         "robot": recording.name.removesuffix(" simulated"),
         "joints": list(recording.joint_names),
         "samples": recording.n_t,

@@ -10,6 +10,7 @@ from tauhat.recordings.processing import Processing
 from tauhat.report.case import Case, Section
 from tauhat.report.rendering import rendered
 
+_LONGEST = 16  # values of a setting that are shown one by one
 _PROCESSING = {
     "cutoff": (
         "Low-pass of torque and model",
@@ -32,6 +33,7 @@ def given(case: Case) -> Section:
         terms=[_described(term) for term in estimate.model.terms],
         processing=_processing(estimate.processing),
         estimator=_estimator(dict(estimate.estimator)),
+        structure=estimate.structure,
         version=estimate.version,
     )
     return Section(key="given", title="What was given", html=html)
@@ -64,6 +66,8 @@ def _settings(values: dict[str, Any]) -> str:
 def _short(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
+    if isinstance(value, tuple | list) and len(value) > _LONGEST:
+        return f"{len(value)} values"
     if isinstance(value, tuple | list):
         return "(" + ", ".join(_short(item) for item in value) + ")"
     return str(value)

@@ -23,6 +23,7 @@ def motion(case: MotionCase) -> Section:
         random_condition=float(case.singular_random[0] / case.singular_random[-1]),
         duration=float(case.samples.t[-1] + case.samples.t[1] - case.samples.t[0]),
         n=len(case.names),
+        rests=case.rests,
     )
     return Section(key="motion", title="The motion", html=html, plots=plots)
 

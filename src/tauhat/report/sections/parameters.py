@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import groupby
 from typing import NamedTuple
 
@@ -22,7 +23,19 @@ _SYMBOLS = {
     "Ia": "rotor inertia, joint side of the gear",
     "Fv": "viscous friction",
     "Fc": "Coulomb friction",
+    "Fr": "friction in proportion to the cube root of the speed",
+    "Fs": "Stribeck friction, on top at low speed",
+    "Fd, Fe": "dry friction that builds up over a short and over a longer displacement",
+    "Fl": "friction as a part of the rigid-body torque on the joint",
+    "Fva": "half the difference of viscous friction forwards and backwards",
+    "Fv+, Fv-, Fc+, Fc-": "viscous and Coulomb friction forwards and backwards",
+    "k0, k1, k2, k3, k4": "friction as a polynomial of the speed, and its Stribeck part k4",
     "To": "constant offset of the torque",
+    "Iam, Fvm": "rotor inertia and viscous friction of a motor that turns with two joints",
+    "Fsm": "Coulomb friction of such a motor",
+    "Fdm, Fem": "dry friction of such a motor over a short and over a longer displacement",
+    "Ks": "rate of a spring on the joint",
+    "Gs": "pressure times volume of a gas spring",
 }
 
 
@@ -49,7 +62,7 @@ def parameters(case: Case) -> Section:
         "parameters.html.j2",
         plot=plot,
         groups=_groups(case),
-        symbols=_SYMBOLS,
+        symbols=_symbols(parameter.symbol for parameter in standard),
         counts={"sure": int((relative < _SURE).sum()), "unknown": int((relative >= _UNKNOWN).sum())},
         n_p=len(base.names),
         n_b=base.n_b,
@@ -58,6 +71,16 @@ def parameters(case: Case) -> Section:
         degrees=estimate.degrees,
     )
     return Section(key="parameters", title="Parameters with error bars", html=html, plots=(plot,))
+
+
+def _symbols(present: Iterable[str]) -> dict[str, str]:
+    """Return what the symbols of this model mean."""
+    known = set(present)
+    return {key: meaning for key, meaning in _SYMBOLS.items() if known.intersection(_members(key))}
+
+
+def _members(key: str) -> list[str]:
+    return ["Ixx", "Iyy", "Izz"] if key.startswith("Ixx") else key.split(", ")
 
 
 def _groups(case: Case) -> list[tuple[str, list[Row]]]:

@@ -37,7 +37,7 @@ def verdict(case: Case) -> Section:
         overall=[grade_cell(estimate.relative_rms), *(grade_cell(log.relative_rms) for log in case.logs)],
         grades=GRADES,
         condition=estimate.condition,
-        condition_grade=condition_grade(estimate.condition, full_rank=estimate.rank >= estimate.base.n_b),
+        condition_grade=condition_grade(estimate.condition, full_rank=estimate.rank >= estimate.n_fitted),
         good_condition=GOOD_CONDITION,
         doubtful_condition=DOUBTFUL_CONDITION,
         rank=estimate.rank,
