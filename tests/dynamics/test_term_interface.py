@@ -1,5 +1,5 @@
 # ruff: noqa: ARG002 (the terms here take what every term takes)
-"""The Term interface carries what later models need: states along a recording, previous torques, coupled joints."""
+"""The Term interface carries what later models need: states along a recording, parameters of a pass before, coupled joints."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from sample_arms import planar_arm, planar_truth, smooth_motion
 from tauhat.dynamics import Inertia, Motion, Parameter, Term, TorqueModel, Viscous, base_parameters, inverse_dynamics
+from tauhat.dynamics.terms import LoadCoulomb
 from tauhat.estimation.rows import filtered_rows
 from tauhat.recordings.processing import Processing
 
@@ -43,25 +44,6 @@ class BristleFriction(Term):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LoadFriction(Term):
-    """Iterated: friction that grows with the torque of the previous pass."""
-
-    key: ClassVar[str] = "load"
-    iterated: ClassVar[bool] = True
-
-    def parameters(self, robot):
-        return tuple(Parameter(symbol="Fl", joint=joint, unit="1") for joint in range(robot.n_v))
-
-    def support(self, robot):
-        return tuple(np.array([joint]) for joint in range(robot.n_v))
-
-    def columns(self, robot, motion, state):
-        load = np.zeros_like(motion.q) if motion.load is None else motion.load
-        values = np.abs(load) * np.tanh(motion.dq / 0.05)
-        return tuple(values[joint : joint + 1] for joint in range(motion.n_v)), state
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class WristCoupling(Term):
     """One parameter that loads two joints: a friction on the sum of their speeds."""
 
@@ -78,20 +60,18 @@ class WristCoupling(Term):
         return (together, together), state
 
 
-def motion_with_load(n_t: int) -> Motion:
-    t = np.arange(n_t) * 0.005
-    q, dq, ddq = smooth_motion(2, t)
-    load = inverse_dynamics(planar_arm(), q, dq, ddq)
-    return Motion(q=q.T.copy(), dq=dq.T.copy(), ddq=ddq.T.copy(), step=0.005, load=load.T.copy())
+def smooth_stretch(n_t: int) -> Motion:
+    q, dq, ddq = smooth_motion(2, np.arange(n_t) * 0.005)
+    return Motion(q=q.T.copy(), dq=dq.T.copy(), ddq=ddq.T.copy(), step=0.005)
 
 
-MODEL = TorqueModel(robot=planar_arm(), terms=(Inertia(), BristleFriction(), LoadFriction(), WristCoupling()))
+MODEL = TorqueModel(robot=planar_arm(), terms=(Inertia(), BristleFriction(), LoadCoulomb(widths=(0.05, 0.05)), WristCoupling()))
 
 
 @settings(max_examples=15)
 @given(cuts=st.lists(st.integers(1, 299), max_size=6, unique=True))
 def test_columns_are_the_same_however_the_motion_is_cut(cuts):
-    motion, layout = motion_with_load(300), MODEL.layout()
+    motion, layout = smooth_stretch(300), MODEL.layout()
     whole, last = MODEL.columns(motion, layout)
     parts, states = [], None
     bounds = [0, *sorted(cuts), 300]
@@ -103,21 +83,26 @@ def test_columns_are_the_same_however_the_motion_is_cut(cuts):
 
 
 def test_forgetting_the_state_would_be_noticed():
-    motion, layout = motion_with_load(300), MODEL.layout()
+    motion, layout = smooth_stretch(300), MODEL.layout()
     whole, _ = MODEL.columns(motion, layout)
     fresh, _ = MODEL.columns(motion.samples(150, 300), layout)
     assert np.abs(fresh - whole[:, 150:]).max() > 0.1
 
 
-def test_iterated_columns_read_the_load_of_the_previous_pass():
-    motion, layout = motion_with_load(50), MODEL.layout()
-    columns, _ = MODEL.columns(motion, layout)
-    rows = np.flatnonzero(np.isin(layout.parameters, [22, 23]))
-    assert np.allclose(columns[rows], np.abs(motion.load) * np.tanh(motion.dq / 0.05), rtol=0, atol=1e-15)
+def test_iterated_columns_take_the_load_of_the_parameters_that_the_last_pass_found():
+    motion, layout = smooth_stretch(50), MODEL.layout()
+    found = 1.3 * planar_arm().inertia
+    later = MODEL.with_term(MODEL.terms[2].after(found))
+    sign = np.tanh(motion.dq / 0.05)
+    for model, inertia in ((MODEL, None), (later, found)):
+        columns, _ = model.columns(motion, layout)
+        load = inverse_dynamics(planar_arm(), motion.q.T, motion.dq.T, motion.ddq.T, inertia=inertia).T
+        rows = np.flatnonzero(np.isin(layout.parameters, [22, 23]))
+        assert np.allclose(columns[rows], np.abs(load) * sign, rtol=0, atol=1e-12)
 
 
 def test_a_coupling_parameter_has_a_row_in_both_joints():
-    motion, layout = motion_with_load(50), MODEL.layout()
+    motion, layout = smooth_stretch(50), MODEL.layout()
     columns, _ = MODEL.columns(motion, layout)
     rows = np.flatnonzero(layout.parameters == 24)
     assert [rows[0] < layout.bounds[1], rows[1] >= layout.bounds[1]] == [True, True]

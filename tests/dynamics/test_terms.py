@@ -20,7 +20,8 @@ from tauhat.dynamics import (
     regressor,
     torque_model,
 )
-from tauhat.dynamics.terms import WIDTHS
+from tauhat.dynamics.terms import Facts
+from tauhat.dynamics.terms.friction import WIDTHS
 from tauhat.errors import ModelError
 
 Q = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
@@ -82,19 +83,19 @@ def test_masses_and_moments_cannot_be_negative_but_products_and_centres_can():
 
 
 def test_coulomb_widths_to_choose_from_are_parts_of_the_top_speeds():
-    forms = Coulomb().candidates(np.array([2.0, 3.0, 0.0]))
+    forms = Coulomb().candidates(Facts(np.array([2.0, 3.0, 0.0])))
     assert [form.widths for form in forms] == [pytest.approx((2 * part, 3 * part, part)) for part in WIDTHS]
     assert list(WIDTHS) == sorted(WIDTHS)
 
 
 def test_given_coulomb_widths_stay():
     term = Coulomb(widths=(0.5, 0.6))
-    assert term.candidates(np.array([2.0, 3.0])) == (term,)
+    assert term.candidates(Facts(np.array([2.0, 3.0]))) == (term,)
 
 
 @pytest.mark.parametrize("term", [Inertia(), RotorInertia(), Viscous(), Offset()])
 def test_other_terms_leave_no_choice(term):
-    assert term.candidates(np.array([2.0, 3.0])) == (term,)
+    assert term.candidates(Facts(np.array([2.0, 3.0]))) == (term,)
 
 
 def test_a_term_is_replaced_by_one_of_its_kind_alone():
@@ -111,7 +112,7 @@ def test_a_width_that_is_not_positive_is_refused(width):
 
 
 def test_a_width_for_every_joint_is_needed():
-    with pytest.raises(ModelError, match="one width a joint is needed; expected 2, got 3"):
+    with pytest.raises(ModelError, match="one of the widths a joint is needed; expected 2, got 3"):
         Coulomb(widths=(0.1, 0.1, 0.1)).columns(planar_arm(), MOTION, None)
 
 
@@ -151,7 +152,7 @@ def test_terms_are_named_in_one_string_with_spaces_allowed():
 
 
 def test_an_unknown_term_is_refused_with_the_known_ones():
-    with pytest.raises(ModelError, match=r"unknown term; expected inertia, rotor, .*, got friction"):
+    with pytest.raises(ModelError, match=r"unknown term; expected plain, robust, inertia, .*, got friction"):
         torque_model(planar_arm(), "inertia,friction")
 
 

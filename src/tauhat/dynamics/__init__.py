@@ -1,17 +1,23 @@
 """Batched rigid-body dynamics, terms, torque models and base parameters."""
 
+from tauhat.dynamics.barycentric import BarycentricParameters, barycentric_parameters
 from tauhat.dynamics.base import BaseParameters, base_parameters, random_motion
+from tauhat.dynamics.closed_form_base import closed_form_base
 from tauhat.dynamics.model import PLAIN_TERMS, TERMS, TorqueModel, torque_model
 from tauhat.dynamics.motion import Motion, motion_from_rows
 from tauhat.dynamics.rigid_body import bias_torque, gravity_torque, inverse_dynamics, mass_matrix, regressor
+from tauhat.dynamics.small_terms import without_small_terms
 from tauhat.dynamics.terms import Coulomb, Inertia, Offset, Parameter, RotorInertia, Term, Viscous
+from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
 
 __all__ = [
     "PLAIN_TERMS",
     "TERMS",
+    "BarycentricParameters",
     "BaseParameters",
     "Coulomb",
     "Inertia",
+    "InertiaWithoutProducts",
     "Motion",
     "Offset",
     "Parameter",
@@ -19,8 +25,10 @@ __all__ = [
     "Term",
     "TorqueModel",
     "Viscous",
+    "barycentric_parameters",
     "base_parameters",
     "bias_torque",
+    "closed_form_base",
     "gravity_torque",
     "inverse_dynamics",
     "mass_matrix",
@@ -28,4 +36,5 @@ __all__ = [
     "random_motion",
     "regressor",
     "torque_model",
+    "without_small_terms",
 ]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.motion import Motion
+from tauhat.dynamics.terms import Inertia, InertiaWithoutProducts
 from tauhat.errors import ModelError, TauhatWarning
 from tauhat.robots.robot import Robot
 
@@ -26,6 +27,8 @@ FAINT = 1e-4  # a column below this part of the largest of its unit is a rounded
 CLEAR_GAP = 1e3  # smallest factor between the last kept and the first dropped part that needs no warning
 _SEED = 20240229
 _STATES = 400
+_REVERSALS = 0.2  # share of the steps that turn back
+_PART = 1e-3  # of a column of unit norm: a smaller part in a sum is rounding
 _STEP = 0.01  # [s] between the states, for terms that carry a state
 _PREFERENCE = ("Ixx", "Ixy", "Ixz", "Iyz", "Izz", "mx", "my", "mz", "Iyy", "m")
 
@@ -92,8 +95,21 @@ def random_motion(robot: Robot, n_t: int, rng: np.random.Generator) -> Motion:
         dq=speed[:, None] * rng.uniform(-1.0, 1.0, shape),
         ddq=3.0 * speed[:, None] * rng.uniform(-1.0, 1.0, shape),
         step=_STEP,
-        load=rng.uniform(-1.0, 1.0, shape),
     )
+
+
+def creeping_motion(robot: Robot, n_t: int, rng: np.random.Generator) -> Motion:
+    """Return states that creep to and fro in steps and at speeds of all sizes, (n_v, n_t) each.
+
+    Among random states no friction law shows its shape: every step is longer than any pre-sliding, hardly any speed is
+    low. Here steps are between 1e-6 and 0.1 rad or m, speeds between 1e-4 and one times the limit.
+    """
+    states = random_motion(robot, n_t, rng)
+    shape = states.q.shape
+    turns = np.cumprod(np.where(rng.random(shape) < _REVERSALS, -1.0, 1.0), axis=1)
+    steps = turns * 10.0 ** rng.uniform(-6.0, -1.0, shape)
+    speeds = np.abs(states.dq).max(axis=1, keepdims=True) * 10.0 ** rng.uniform(-4.0, 0.0, shape)
+    return Motion(q=states.q[:, :1] + np.cumsum(steps, axis=1), dq=turns * speeds, ddq=states.ddq, step=_STEP)
 
 
 def base_parameters(model: TorqueModel, *, tolerance: float = RANK_TOLERANCE) -> BaseParameters:
@@ -106,7 +122,7 @@ def base_parameters(model: TorqueModel, *, tolerance: float = RANK_TOLERANCE) ->
     Raises
     ------
     ModelError
-        when no parameter loads any joint.
+        when no parameter loads any joint, or two terms load a joint in the same way.
 
     Warns
     -----
@@ -118,6 +134,7 @@ def base_parameters(model: TorqueModel, *, tolerance: float = RANK_TOLERANCE) ->
     visible = _visible(model, norms)
     if not visible.any():
         raise ModelError("no parameter of the model loads any joint", where=model.robot.name)
+    _refuse_alike(model, triangle / np.where(visible, norms, 1.0), visible, tolerance)
     independent, remainders = _sift(triangle / np.where(visible, norms, 1.0), order[visible[order]], tolerance)
     _warn_of_small_gap(remainders, tolerance)
     dependent = np.setdiff1d(np.flatnonzero(visible), independent)
@@ -154,19 +171,60 @@ def _preference(model: TorqueModel, index: int) -> tuple[int, int, int]:
 
 
 def _visible(model: TorqueModel, norms: FloatArray) -> NDArray[np.bool_]:
+    """Return which columns are not zero, (n_p,); what rigid bodies make may be a rounded angle, and then counts as zero."""
     units = np.array([parameter.unit for parameter in model.parameters])
-    return np.array([norm > FAINT * norms[units == unit].max() for norm, unit in zip(norms, units, strict=True)])
+    bodies = _of_bodies(model)
+    return np.array(
+        [
+            norm > (FAINT * norms[bodies & (units == unit)].max() if body else 0.0)
+            for norm, unit, body in zip(norms, units, bodies, strict=True)
+        ]
+    )
+
+
+def _of_bodies(model: TorqueModel) -> NDArray[np.bool_]:
+    """Return which parameters' columns come from the rigid bodies: their own, and those of load friction, (n_p,)."""
+    rigid = (Inertia, InertiaWithoutProducts)
+    owned = [isinstance(term, rigid) or term.iterated for term in model.terms for _ in term.parameters(model.robot)]
+    return np.array(owned, dtype=np.bool_)
+
+
+def _refuse_alike(model: TorqueModel, scaled: FloatArray, visible: NDArray[np.bool_], tolerance: float) -> None:
+    """Refuse two terms of which one's columns are a sum of the other's: they are fitted twice, and mean nothing apart.
+
+    Rigid bodies are left out: a rotor's inertia, a spring or an offset may well be regrouped into theirs.
+    """
+    owner = np.array([term.key for term in model.terms for _ in term.parameters(model.robot)])
+    rigid = [term.key for term in model.terms if isinstance(term, Inertia | InertiaWithoutProducts)]
+    drives = np.flatnonzero(visible & ~np.isin(owner, rigid))
+    kept, _ = _sift(scaled, drives, tolerance)
+    for column in np.setdiff1d(drives, kept):
+        weights = np.linalg.lstsq(scaled[:, kept], scaled[:, column], rcond=None)[0]
+        others = [key for key in owner[kept[np.abs(weights) > _PART]] if key != owner[column]]
+        if others:
+            joint = model.robot.joint_names[model.parameters[column].joint]
+            raise ModelError(
+                f"terms {others[0]} and {owner[column]} cannot be told apart on {joint}",
+                remedy=f"leave out {others[0]} or {owner[column]}",
+            )
 
 
 def _sampled_triangle(model: TorqueModel) -> tuple[FloatArray, FloatArray]:
     """Return the triangular factor of the regressor on random states, (n_p, n_p), and its column norms."""
-    motion = random_motion(model.robot, _STATES, np.random.default_rng(_SEED))
+    rng = np.random.default_rng(_SEED)
+    motions = [random_motion(model.robot, _STATES, rng)]
+    if any(term.key != Inertia.key for term in model.terms):
+        motions.append(creeping_motion(model.robot, _STATES, rng))
     layout = model.layout()
-    columns, _ = model.columns(motion, layout)
-    stacked = np.zeros((model.robot.n_v * motion.n_t, model.n_p))
-    for joint in range(model.robot.n_v):
-        rows = layout.of_joint(joint)
-        stacked[joint * motion.n_t : (joint + 1) * motion.n_t, layout.parameters[rows]] = columns[rows].T
+    parts = []
+    for motion in motions:
+        columns, _ = model.columns(motion, layout)
+        for joint in range(model.robot.n_v):
+            rows = layout.of_joint(joint)
+            part = np.zeros((motion.n_t, model.n_p))
+            part[:, layout.parameters[rows]] = columns[rows].T
+            parts.append(part)
+    stacked = np.vstack(parts)
     norms = np.linalg.norm(stacked, axis=0)
     triangle = np.linalg.qr(stacked / np.where(norms > 0, norms, 1.0), mode="r") * norms
     return triangle, norms

@@ -5,19 +5,47 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.motion import Motion, MotionGradient, no_gradient
-from tauhat.dynamics.terms import Coulomb, Inertia, Offset, Parameter, RotorInertia, Term, Viscous
+from tauhat.dynamics.terms import (
+    Asymmetric,
+    Coulomb,
+    Coupling,
+    CouplingDahl,
+    CubeRoot,
+    Dahl,
+    GasSpring,
+    Inertia,
+    InertiaWithoutProducts,
+    LoadCoulomb,
+    LoadDahl,
+    Offset,
+    Parameter,
+    PolynomialFriction,
+    RotorInertia,
+    Spring,
+    Stribeck,
+    Term,
+    Viscous,
+    ViscousAsymmetry,
+)
 from tauhat.errors import ModelError
 from tauhat.robots.robot import Robot
 
-TERMS: Mapping[str, type[Term]] = {term.key: term for term in (Inertia, RotorInertia, Viscous, Coulomb, Offset)}
+_KNOWN: tuple[type[Term], ...] = (
+    *(Inertia, InertiaWithoutProducts, RotorInertia, Coupling, CouplingDahl, Spring, GasSpring),
+    *(Viscous, CubeRoot, Coulomb, ViscousAsymmetry, Asymmetric, Stribeck, PolynomialFriction),
+    *(Dahl, LoadCoulomb, LoadDahl, Offset),
+)
+TERMS: Mapping[str, type[Term]] = {term.key: term for term in _KNOWN}
 PLAIN_TERMS = ("inertia", "rotor", "viscous", "coulomb", "offset")
+ROBUST_TERMS = ("inertia", "rotor", "viscous", "cube-root", "stribeck", "dahl", "load-dahl", "offset")
+MODELS: Mapping[str, tuple[str, ...]] = {"plain": PLAIN_TERMS, "robust": ROBUST_TERMS}
 
 TermStates = tuple[FloatArray | None, ...]
 
@@ -57,6 +85,13 @@ class TorqueModel:
             raise ModelError("a torque model needs at least one term", expected=", ".join(TERMS))
         if len(set(keys)) < len(keys):
             raise ModelError("a term is given twice", got=", ".join(keys))
+        for term in self.terms:
+            contained = [key for key in term.stands_for if key in keys]
+            if contained:
+                raise ModelError(
+                    f"term {term.key} cannot be told apart from {', '.join(contained)}",
+                    remedy=f"leave out {term.key} or {', '.join(contained)}",
+                )
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -153,7 +188,7 @@ class TorqueModel:
 
 
 def _term_from_dict(data: Mapping[str, Any]) -> Term:
-    settings = {name: value for name, value in data.items() if name != "term"}
+    settings = {name: _tuples(value) for name, value in data.items() if name != "term"}
     key = str(data.get("term"))
     if key not in TERMS:
         raise ModelError("unknown term", expected=", ".join(TERMS), got=key)
@@ -163,19 +198,40 @@ def _term_from_dict(data: Mapping[str, Any]) -> Term:
         raise ModelError(f"term {key} has other settings in this version", got=", ".join(settings)) from error
 
 
+def _tuples(value: Any) -> Any:
+    """Return lists of plain data as the tuples they were."""
+    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+
+
 def torque_model(robot: Robot, terms: str | Iterable[str] = PLAIN_TERMS) -> TorqueModel:
-    """Return the model with the named terms, e.g. `"inertia,rotor,viscous,coulomb,offset"`, in their default settings.
+    """Return the model with the named terms, e.g. `"inertia,viscous,coulomb"` or `"robust"`, in their default settings.
+
+    "plain" is the textbook's `inertia,rotor,viscous,coulomb,offset`; "robust" is what predicts real arms best.
 
     Raises
     ------
     ModelError
-        when a name is unknown or given twice.
+        when a name is unknown or given twice, or a term cannot be told apart from another.
     """
-    return TorqueModel(robot=robot, terms=tuple(TERMS[key]() for key in known_terms(terms)))
+    return TorqueModel(robot=robot, terms=tuple(default_term(key) for key in known_terms(terms)))
+
+
+def default_term(key: str) -> Term:
+    """Return the term of this name in its default settings.
+
+    Raises
+    ------
+    ModelError
+        when it has none, as a gas spring without its geometry.
+    """
+    needed = [item.name for item in fields(TERMS[key]) if item.default is MISSING and item.default_factory is MISSING]
+    if needed:
+        raise ModelError(f"term {key} needs {', '.join(needed)}", remedy="give them in a model file (TOML)")
+    return TERMS[key]()
 
 
 def known_terms(terms: str | Iterable[str]) -> tuple[str, ...]:
-    """Return the names in a list of terms.
+    """Return the names in a list of terms, with "plain" and "robust" written out.
 
     Raises
     ------
@@ -183,8 +239,10 @@ def known_terms(terms: str | Iterable[str]) -> tuple[str, ...]:
         when one is unknown.
     """
     names = terms.split(",") if isinstance(terms, str) else list(terms)
-    keys = tuple(name.strip() for name in names)
+    keys = tuple(key for name in names for key in MODELS.get(name.strip(), (name.strip(),)))
     unknown = [key for key in keys if key not in TERMS]
     if unknown:
-        raise ModelError("unknown term", expected=", ".join(TERMS), got=", ".join(key or "''" for key in unknown))
+        raise ModelError(
+            "unknown term", expected=", ".join((*MODELS, *TERMS)), got=", ".join(key or "''" for key in unknown)
+        )
     return keys

@@ -16,14 +16,12 @@ class Motion:
 
     q, dq, ddq : position, velocity, acceleration [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
     step : time between samples [s]
-    load : rigid-body torque of a previous pass [Nm or N], for terms with iterated columns
     """
 
     q: FloatArray
     dq: FloatArray
     ddq: FloatArray
     step: float = 0.0
-    load: FloatArray | None = None
 
     @property
     def n_v(self) -> int:
@@ -37,10 +35,7 @@ class Motion:
 
     def samples(self, start: int, stop: int) -> Motion:
         """Return samples `start` to `stop`, end excluded."""
-        load = None if self.load is None else self.load[:, start:stop]
-        return Motion(
-            q=self.q[:, start:stop], dq=self.dq[:, start:stop], ddq=self.ddq[:, start:stop], step=self.step, load=load
-        )
+        return Motion(q=self.q[:, start:stop], dq=self.dq[:, start:stop], ddq=self.ddq[:, start:stop], step=self.step)
 
 
 class MotionGradient(NamedTuple):

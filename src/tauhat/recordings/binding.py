@@ -105,6 +105,7 @@ class BoundLog:
             name=self.path.name.split(".")[0] or self.path.name,
             path=str(self.path),
             first_row=window[0],
+            shared_motors=self.log_map.coupling.shared_motors(),
         )
 
     def _signals(self, raw: FloatArray, low: int, high: int) -> dict[str, Any]:

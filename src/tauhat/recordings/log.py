@@ -11,6 +11,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, read_only
 from tauhat.errors import RecordingError, TauhatWarning
 from tauhat.recordings.recording import FEWEST_SAMPLES, LARGEST_VALUE, Recording, Source
+from tauhat.robots.shared_motor import SharedMotor
 
 LARGEST_TIME = 1e19  # [s] more than nanoseconds since 1970 taken for seconds
 SIGNALS = ("q", "dq", "ddq", "tau", "temperature", "wrench")
@@ -28,6 +29,7 @@ class Log:
     units : "rad" or "m" of each joint
     path : the file, for messages
     first_row : row of the file that sample 0 came from
+    shared_motors : motors that, after the map, turn with two joints
     """
 
     t: FloatArray
@@ -43,6 +45,7 @@ class Log:
     path: str = "log"
     first_row: int = 0
     source: Source | None = None
+    shared_motors: tuple[SharedMotor, ...] = ()
 
     def __post_init__(self) -> None:
         read_only(self.t)
@@ -79,7 +82,10 @@ class Log:
         self._refuse_corrupt()
         kept = self._distinct()
         signals = {name: signal[kept] for name, signal in self.signals().items()}
-        return Recording(t=self.t[kept], **signals, joint_names=self.joint_names, name=self.name, source=self.source)
+        return Recording(
+            t=self.t[kept], **signals, joint_names=self.joint_names, name=self.name, source=self.source,
+            shared_motors=self.shared_motors,
+        )  # fmt: skip
 
     def _refuse_corrupt(self) -> None:
         if self.n_t < FEWEST_SAMPLES:

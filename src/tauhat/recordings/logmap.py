@@ -18,6 +18,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import MapError
+from tauhat.robots.shared_motor import SharedMotor
 
 Column: TypeAlias = str | int
 
@@ -36,6 +37,7 @@ UNITS: Mapping[str, Mapping[str, float | None]] = {
 }
 KINDS = tuple(UNITS)
 _KELVIN = -273.15
+_COUPLED = 1e-9  # entry beside the diagonal, in parts of it, from which a motor turns with another joint
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,6 +174,19 @@ class Coupling:
             if matrix.shape[0] != matrix.shape[1] or np.linalg.matrix_rank(matrix) < matrix.shape[0]:
                 raise MapError("not an invertible square matrix", where=f"[coupling] {name}", got=matrix.shape)
             object.__setattr__(self, name, matrix)
+
+    def shared_motors(self) -> tuple[SharedMotor, ...]:
+        """Return the motors that turn with two joints: rows of `position^-1` with an entry beside the diagonal."""
+        if self.position is None:
+            return ()
+        turns = np.linalg.inv(self.position)
+        sizes = np.abs(np.diag(turns))
+        beside = np.abs(turns) > _COUPLED * np.maximum(sizes[:, None], np.finfo(float).tiny)
+        return tuple(
+            SharedMotor(int(own), int(other), float(turns[own, other] / turns[own, own]))
+            for own, other in np.argwhere(beside)
+            if own != other and sizes[own] > 0.0
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -8,6 +8,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import RecordingError
+from tauhat.robots.shared_motor import SharedMotor
 
 LARGEST_VALUE = 1e9  # no SI quantity of a robot joint reaches it; larger numbers are corrupt rows
 FEWEST_SAMPLES = 16
@@ -34,6 +35,7 @@ class Recording:
     wrench : (n_t, 6) force first, then moment [N, Nm], where measured
     joint_names : names of the columns
     name : what reports call it
+    shared_motors : motors that, after the log's map, turn with two joints
     """
 
     t: FloatArray
@@ -46,6 +48,7 @@ class Recording:
     joint_names: tuple[str, ...] = ()
     name: str = "recording"
     source: Source | None = None
+    shared_motors: tuple[SharedMotor, ...] = ()
 
     def __post_init__(self) -> None:
         t = frozen("t", self.t, (None,), where=self.name)

@@ -1,0 +1,49 @@
+"""Terms: physical effects that add to a joint's torque and are linear in their parameters."""
+
+from tauhat.dynamics.terms.bank import Bank
+from tauhat.dynamics.terms.drives import GasSpring, RotorInertia, Spring
+from tauhat.dynamics.terms.friction import (
+    Asymmetric,
+    Coulomb,
+    CubeRoot,
+    Offset,
+    PolynomialFriction,
+    Stribeck,
+    Viscous,
+    ViscousAsymmetry,
+)
+from tauhat.dynamics.terms.inertia import INERTIAL_SYMBOLS, Inertia
+from tauhat.dynamics.terms.joint_term import JointTerm, ShapedTerm
+from tauhat.dynamics.terms.load import LoadCoulomb, LoadDahl
+from tauhat.dynamics.terms.presliding import Dahl
+from tauhat.dynamics.terms.shared_motors import Coupling, CouplingDahl
+from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
+from tauhat.dynamics.terms.term import Facts, Parameter, Term
+
+__all__ = [
+    "INERTIAL_SYMBOLS",
+    "Asymmetric",
+    "Bank",
+    "Coulomb",
+    "Coupling",
+    "CouplingDahl",
+    "CubeRoot",
+    "Dahl",
+    "Facts",
+    "GasSpring",
+    "Inertia",
+    "InertiaWithoutProducts",
+    "JointTerm",
+    "LoadCoulomb",
+    "LoadDahl",
+    "Offset",
+    "Parameter",
+    "PolynomialFriction",
+    "RotorInertia",
+    "ShapedTerm",
+    "Spring",
+    "Stribeck",
+    "Term",
+    "Viscous",
+    "ViscousAsymmetry",
+]
