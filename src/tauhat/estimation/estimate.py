@@ -16,6 +16,8 @@ from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.motion import motion_from_rows
 from tauhat.errors import EstimateError, TauhatError
+from tauhat.estimation.friction import SteadyFriction, steady_friction
+from tauhat.estimation.structure import Structure
 from tauhat.files import read_text, replace_file
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
@@ -81,6 +83,9 @@ class Estimate:
     joint_rms, torque_rms : (n_v,) residual and torque of the fit [Nm or N]
     rank, condition : of the scaled regressor
     inputs : the recordings it was fitted on
+    structure : how the terms were chosen, when they were
+    standard : (n_p,) all standard parameters, where they were identified under physical constraints
+    physical : what these constraints were, what they cost and what proves the solution
     version : of the library that wrote it
     """
 
@@ -96,6 +101,9 @@ class Estimate:
     rank: int
     condition: float
     inputs: tuple[InputLog, ...]
+    structure: Structure | None = None
+    standard: FloatArray | None = None
+    physical: Mapping[str, Any] | None = None
     version: str = tauhat.__version__
 
     def __post_init__(self) -> None:
@@ -108,6 +116,9 @@ class Estimate:
         }
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape, where="estimate"))
+        if self.standard is not None:
+            standard = frozen("standard", self.standard, (len(self.base.names),), where="estimate")
+            object.__setattr__(self, "standard", standard)
         if (np.diag(self.covariance) < 0.0).any():
             raise EstimateError("a variance is negative", where="estimate")
 
@@ -120,6 +131,21 @@ class Estimate:
     def standard_errors(self) -> FloatArray:
         """Standard errors of the base parameters, (n_b,)."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def n_fitted(self) -> int:
+        """Number of base parameters that were fitted; fewer than all where the essential ones alone were kept."""
+        return int(np.count_nonzero(np.diag(self.covariance)))
+
+    def friction(self, speeds: FloatArray) -> SteadyFriction:
+        """Return the friction torque of each joint in steady motion at these speeds, (n_v,), with standard errors.
+
+        Parameters
+        ----------
+        speeds : (n_v,) positive [rad/s or m/s]
+        """
+        wanted = frozen("speeds", speeds, (self.robot.n_v,))
+        return steady_friction(self.model, self.base, self.values, self.covariance, wanted)
 
     def half_intervals(self, *, confidence: float = 0.95) -> FloatArray:
         """Return half of each base parameter's confidence interval, (n_b,), by Student's t."""
@@ -205,6 +231,7 @@ class Estimate:
                 "condition": self.condition if np.isfinite(self.condition) else None,
                 "degrees": self.degrees,
             },
+            "structure": None if self.structure is None else self.structure.to_dict(),
             "processing": self.processing.to_dict(),
             "inputs": [asdict(log) for log in self.inputs],
             "model": self.model.to_dict(),
@@ -216,6 +243,8 @@ class Estimate:
             },
             "values": self.values.tolist(),
             "covariance": self.covariance.tolist(),
+            "standard": None if self.standard is None else self.standard.tolist(),
+            "physical": None if self.physical is None else dict(self.physical),
         }
 
     def save(self, path: str | Path) -> None:
@@ -288,6 +317,9 @@ def estimate_from_dict(data: Mapping[str, Any]) -> Estimate:
         torque_rms=fit["torque_rms"],
         rank=int(fit["rank"]),
         condition=np.inf if fit["condition"] is None else float(fit["condition"]),
+        structure=Structure.from_dict(data["structure"]) if data.get("structure") else None,
+        standard=data.get("standard"),
+        physical=data.get("physical"),
         inputs=tuple(InputLog(**{**log, "rows": tuple(log["rows"])}) for log in data["inputs"]),
         version=str(data["tauhat_version"]),
     )

@@ -110,6 +110,30 @@ class Evidence:
         blocks = _at_most((*self.blocks, *other.blocks), MOST_BLOCKS)
         return replace(self, blocks=blocks, recordings=(*self.recordings, *other.recordings))
 
+    def keeping(self, columns: IntArray) -> Evidence:
+        """Return the evidence on some of the parameters alone, as if the others were not in the model.
+
+        Parameters
+        ----------
+        columns : increasing indices of the kept parameters
+        """
+        place = np.full(self.n_b, -1)
+        place[columns] = np.arange(columns.size)
+        picked = [np.flatnonzero(place[support] >= 0) for support in self.supports]
+        blocks = tuple(
+            Block(
+                factors=tuple(factor[:, np.append(own, -1)] for factor, own in zip(block.factors, picked, strict=True)),
+                n_t=block.n_t,
+            )
+            for block in self.blocks
+        )
+        supports = tuple(place[support[own]] for support, own in zip(self.supports, picked, strict=True))
+        return replace(self, supports=supports, n_b=int(columns.size), blocks=blocks, fingerprint="")
+
+    def of_blocks(self, blocks: Iterable[Block]) -> Evidence:
+        """Return the evidence of some of the blocks."""
+        return replace(self, blocks=tuple(blocks))
+
     def merged_blocks(self, most: int) -> tuple[Block, ...]:
         """Return the blocks of time with neighbours merged until there are at most `most`."""
         return _at_most(self.blocks, most)

@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 
 import numpy as np
 
 from tauhat.blas import single_threaded
 from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
-from tauhat.errors import ModelError, TauhatWarning
+from tauhat.errors import TauhatWarning
 from tauhat.estimation.estimate import Estimate, input_log
 from tauhat.estimation.evidence import Evidence, collect_all
+from tauhat.estimation.iterating import iterated
 from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
-from tauhat.estimation.rows import check_joints
+from tauhat.estimation.physical import consistent
+from tauhat.estimation.physical_constraints import PhysicalConstraints
+from tauhat.estimation.problem import Problem
+from tauhat.estimation.rows import check_recordings
 from tauhat.estimation.solution import Solution
 from tauhat.estimation.tuning import tuned
+from tauhat.recordings.choice import top_speeds
 from tauhat.recordings.processing import Processing, moving_joints
 from tauhat.recordings.recording import Recording
 
+_DEAR = 0.02  # share of the residual that constraints may cost before the bound on rotor inertias is looked at
+_ROTOR = "Ia"
 DOUBTFUL_CONDITION = 300.0  # scaled condition number above which a motion does not support its model
 
 
@@ -32,6 +39,7 @@ def identify(
     estimator: Estimator | None = None,
     processing: Processing | None = None,
     cutoff: float | None = None,
+    constraints: PhysicalConstraints | None = None,
 ) -> Estimate:
     """Return the model's base parameters identified from recordings, with error bars and provenance.
 
@@ -41,6 +49,7 @@ def identify(
     estimator : weighted least squares by default
     processing : all filters; chosen from the recordings by default and kept in the estimate
     cutoff : only the low-pass of torque and columns [Hz]; the rest is chosen
+    constraints : what physics allows; the estimate then holds all standard parameters, too. Free by default
 
     Raises
     ------
@@ -54,19 +63,20 @@ def identify(
     TauhatWarning
         when a joint stands still, the motion is too weak for the model, or friction comes out negative on most joints.
     """
-    if not recordings:
-        raise ModelError("no recording to identify from")
-    for recording in recordings:
-        check_joints(model, recording)
+    check_recordings(model, recordings)
     method = estimator or WeightedLeastSquares()
     settled, settings = tuned(model, recordings, processing=processing, cutoff=cutoff)
+    settled = iterated(settled, recordings, settings, method)
     base = base_parameters(settled)
     evidence = collect_all(settled, base, recordings, settings)
-    solution = method.fit(evidence)
+    problem = Problem(model=settled, base=base, recordings=tuple(recordings), processing=settings, evidence=evidence)
+    solution = method.fit_problem(problem)
     _warn_of_still_joints(recordings)
     estimate = _estimate(settled, base, solution, settings=settings, method=method, recordings=recordings)
+    if constraints is not None:
+        estimate = _made_physical(estimate, evidence, solution, constraints)
     warn_of_weak_motion(evidence, solution, estimate)
-    _warn_of_negative_friction(estimate)
+    _warn_of_negative_friction(estimate, recordings)
     return estimate
 
 
@@ -90,9 +100,45 @@ def _estimate(
     )
 
 
+def _made_physical(
+    estimate: Estimate, evidence: Evidence, solution: Solution, constraints: PhysicalConstraints
+) -> Estimate:
+    """Return the estimate with the physically consistent parameters that fit best.
+
+    Where the recordings clearly refuse a positive rotor inertia, it is left free: a torque that is measured behind the
+    gear, or from which the controller has taken the rotor's share, has none, and the links must not pay for it.
+
+    Warns
+    -----
+    TauhatWarning
+        when that is so.
+    """
+    model, base, weights = estimate.model, estimate.base, solution.weights
+    found, kept = consistent(evidence, model, base, weights=weights, constraints=constraints), constraints
+    if found.cost > _DEAR and _ROTOR not in constraints.unbounded:
+        freed = replace(constraints, unbounded=(*constraints.unbounded, _ROTOR))
+        freer = consistent(evidence, model, base, weights=weights, constraints=freed)
+        if freer.cost < 0.5 * found.cost:
+            warnings.warn(
+                f"rotor inertias of at least zero cost {100 * found.cost:.0f} % of the residual, without that bound "
+                f"{100 * freer.cost:.1f} %: it is not kept; the torque lacks the rotors' share (measured "
+                "behind the gear, or compensated by the controller)",
+                TauhatWarning,
+                stacklevel=4,
+            )
+            found, kept = freer, freed
+    return replace(
+        estimate,
+        values=found.values,
+        joint_rms=found.joint_rms,
+        standard=found.standard,
+        physical=found.report(kept),
+    )
+
+
 def warn_of_weak_motion(evidence: Evidence, solution: Solution, estimate: Estimate) -> None:
     """Warn when rank is lost or the scaled condition number says that the motion cannot tell the parameters apart."""
-    if solution.rank < evidence.n_b:
+    if solution.rank < np.count_nonzero(np.diag(solution.covariance)):
         warnings.warn(
             f"the motion determines only {solution.rank} of {evidence.n_b} base parameters, the others are the "
             "smallest that fit: do not use the model outside this motion; record a richer one",
@@ -104,7 +150,8 @@ def warn_of_weak_motion(evidence: Evidence, solution: Solution, estimate: Estima
         warnings.warn(
             f"scaled condition number {solution.condition:.3g} (good below 100, doubtful above "
             f"{DOUBTFUL_CONDITION:g}); least certain: {', '.join(row.name for row in weakest)}; the model fits this "
-            "motion and may be far off on another: record a richer one or give more recordings",
+            "motion and may be far off on another: record a richer one, give more recordings, or identify with "
+            "physical constraints (--physical)",
             TauhatWarning,
             stacklevel=3,
         )
@@ -123,20 +170,16 @@ def _warn_of_still_joints(recordings: Sequence[Recording]) -> None:
         )
 
 
-def _warn_of_negative_friction(estimate: Estimate) -> None:
-    parameters = estimate.model.parameters
-    friction = [
-        (float(value), parameters[index])
-        for index, value in zip(estimate.base.independent, estimate.values, strict=True)
-        if parameters[index].symbol in {"Fc", "Fv"}
-    ]
-    negative = {parameter.joint for value, parameter in friction if value < 0}
-    both = {joint for joint in negative if all(value < 0 for value, p in friction if p.joint == joint)}
-    if len(both) > estimate.robot.n_v / 2:
-        numbers = ", ".join(estimate.robot.joint_names[joint] for joint in sorted(both))
+def _warn_of_negative_friction(estimate: Estimate, recordings: Sequence[Recording]) -> None:
+    """Warn when friction drives most joints at both a fifth and three fifths of their top speeds."""
+    speeds = np.maximum(top_speeds(recordings), np.finfo(float).tiny)
+    levels = [estimate.friction(part * speeds).torque for part in (0.2, 0.6)]
+    negative = np.flatnonzero((np.array(levels) < 0.0).all(axis=0))
+    if negative.size > estimate.robot.n_v / 2:
+        numbers = ", ".join(estimate.robot.joint_names[joint] for joint in negative)
         warnings.warn(
-            f"friction is negative on {len(both)} of {estimate.robot.n_v} joints ({numbers}): the torque is probably "
-            "logged with the sign reversed; set `sign = -1` in the map's [torque] section",
+            f"friction is negative on {negative.size} of {estimate.robot.n_v} joints ({numbers}): the torque is "
+            "probably logged with the sign reversed; set `sign = -1` in the map's [torque] section",
             TauhatWarning,
             stacklevel=3,
         )

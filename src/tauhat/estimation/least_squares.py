@@ -11,6 +11,7 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence
+from tauhat.estimation.problem import Problem
 from tauhat.estimation.solution import (
     Solution,
     honest_covariance,
@@ -47,6 +48,10 @@ class Estimator(ABC):
     @abstractmethod
     def solve(self, evidence: Evidence) -> Solved:
         """Return values alone, the quick part of `fit`."""
+
+    def fit_problem(self, problem: Problem) -> Solution:
+        """Return the solution of a whole problem; methods that need more than its evidence read its recordings."""
+        return self.fit(problem.evidence)
 
     def fit(self, evidence: Evidence) -> Solution:
         """Return values, covariance and diagnostics.

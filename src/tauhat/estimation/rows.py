@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.model import Layout, TermStates, TorqueModel
 from tauhat.dynamics.motion import Motion
-from tauhat.errors import RecordingError
+from tauhat.errors import ModelError, RecordingError
 from tauhat.recordings.filters import HIGHEST_CUTOFF, with_context
 from tauhat.recordings.processing import (
     CHUNK,
@@ -105,6 +105,14 @@ def _stacked(
         block = Motion(q=stretch.q, dq=stretch.dq, ddq=stretch.ddq, step=step)
         columns, states = model.columns(block, layout, states)
         yield np.concatenate([columns, stretch.tau, stretch.dq])
+
+
+def check_recordings(model: TorqueModel, recordings: Sequence[Recording]) -> None:
+    """Refuse no recording at all, and recordings whose number of joints is not the robot's."""
+    if not recordings:
+        raise ModelError("no recording to identify from")
+    for recording in recordings:
+        check_joints(model, recording)
 
 
 def check_joints(model: TorqueModel, recording: Recording) -> None:

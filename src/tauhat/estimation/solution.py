@@ -42,6 +42,8 @@ class Solution:
     rank, condition : of the weighted stacked regressor with columns scaled to unit norm
     degrees : degrees of freedom of the standard errors
     passes : how often the problem was solved
+    cause : why the method stopped, in words
+    advice : what to do about it where something is wrong
     """
 
     values: FloatArray
@@ -53,6 +55,8 @@ class Solution:
     condition: float
     degrees: int
     passes: int
+    cause: str = "solved"
+    advice: str = ""
 
     def __post_init__(self) -> None:
         for array in (self.values, self.covariance, self.weights, self.joint_rms, self.torque_rms):

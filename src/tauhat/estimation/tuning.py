@@ -15,17 +15,21 @@ import numpy as np
 
 from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
+from tauhat.dynamics.terms import Facts
 from tauhat.errors import TauhatWarning
 from tauhat.estimation.delay import position_delay
 from tauhat.estimation.evidence import collect_all
+from tauhat.estimation.iterating import first_loaded
 from tauhat.estimation.least_squares import WeightedLeastSquares
+from tauhat.estimation.shapes import chosen_form
 from tauhat.estimation.solution import joint_residuals
 from tauhat.recordings.choice import MOTION_CUTOFF, choose_processing, top_speeds
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 
 MOST_SAMPLES = 20_000  # settings are chosen on so many samples at most
-_LEAST_GAIN = 0.005  # a candidate must leave that much less residual to replace the default
+_SWEEPS = 2  # over the terms that have a shape: what one takes depends on the others
+_LEAST_GAIN = 0.02  # a candidate must leave that much less residual to replace the default
 
 
 def tuned(
@@ -48,11 +52,12 @@ def tuned(
         when the position is late against the torque and that is compensated.
     """
     sample = _shortened(recordings)
+    settings = processing or choose_processing(recordings, cutoff=cutoff)
+    model = first_loaded(_informed(model, sample), sample, settings, WeightedLeastSquares())
     base = base_parameters(model)
-    if processing is not None:
-        return _shaped(model, base, sample, processing), processing
-    settings = choose_processing(recordings, cutoff=cutoff)
     shaped = _shaped(model, base, sample, settings)
+    if processing is not None:
+        return shaped, processing
     delay = position_delay(shaped, base, sample, settings)
     if delay.certain:
         settings = replace(settings, delay=delay.seconds)
@@ -83,15 +88,33 @@ def _shortened(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     )
 
 
+def _informed(model: TorqueModel, recordings: Sequence[Recording]) -> TorqueModel:
+    """Return the model with what the recordings tell before any fit in the terms that have one form."""
+    facts = _facts(recordings)
+    for term in model.terms:
+        forms = term.candidates(facts)
+        if len(forms) == 1:
+            model = model.with_term(forms[0])
+    return model
+
+
+def _facts(recordings: Sequence[Recording]) -> Facts:
+    shared = next((recording.shared_motors for recording in recordings if recording.shared_motors), ())
+    return Facts(top_speeds(recordings), shared)
+
+
 def _shaped(
     model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], processing: Processing
 ) -> TorqueModel:
-    tops = top_speeds(recordings)
-    for term in model.terms:
-        forms = [model.with_term(form) for form in term.candidates(tops)]
-        if len(forms) > 1:
-            levels = [residual_level(form, base, recordings, processing) for form in forms]
-            model = forms[int(np.argmin(levels))]
+    """Return the model with every open shape chosen; terms are visited in turn until none of them changes."""
+    facts = _facts(recordings)
+    choices = [forms for term in model.terms if len(forms := term.candidates(facts)) > 1]
+    for _ in range(_SWEEPS if len(choices) > 1 else 1):
+        before = model.terms
+        for forms in choices:
+            model = model.with_term(chosen_form(model, base, forms, recordings, processing))
+        if model.terms == before:
+            break
     return model
 
 

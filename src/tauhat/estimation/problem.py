@@ -1,0 +1,37 @@
+"""The problem that an estimator is given: a settled model, recordings, their filters, and the evidence of both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from tauhat.dynamics.base import BaseParameters
+from tauhat.dynamics.model import TorqueModel
+from tauhat.estimation.evidence import Evidence
+from tauhat.estimation.rows import Rows, filtered_rows
+from tauhat.recordings.processing import Processing
+from tauhat.recordings.recording import Recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Problem:
+    """What there is to identify, and from what.
+
+    model : terms with their shapes chosen
+    base : its base parameters
+    recordings : as measured
+    processing : filters of torque and columns
+    evidence : of all recordings, through these filters
+    """
+
+    model: TorqueModel
+    base: BaseParameters
+    recordings: tuple[Recording, ...]
+    processing: Processing
+    evidence: Evidence
+
+    def rows(self) -> Iterator[Rows]:
+        """Yield the filtered rows of every recording again, for methods that need each sample."""
+        layout = self.model.layout(self.base.independent)
+        for recording in self.recordings:
+            yield from filtered_rows(self.model, layout, recording, self.processing)

@@ -1,0 +1,169 @@
+"""Shapes of terms, joint by joint, by variable projection on evidence.
+
+All forms of a term stand side by side as columns of one evidence: a single pass over the recordings. Choosing one form
+a joint is then choosing columns of its factor. The linear parameters of the whole model are solved for every choice, so
+that only the shape is searched; joints are visited in turn, since what one joint's friction does not explain, another's
+inertia may.
+
+Source: Golub, Pereyra, "The differentiation of pseudo-inverses and nonlinear least squares problems whose variables
+separate", 1973.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, IntArray
+from tauhat.dynamics.base import BaseParameters
+from tauhat.dynamics.model import TorqueModel
+from tauhat.dynamics.terms import Bank, ShapedTerm, Term
+from tauhat.estimation.evidence import Evidence, collect_all
+from tauhat.estimation.solution import joint_residuals, joint_torques
+from tauhat.recordings.processing import Processing
+from tauhat.recordings.recording import Recording
+
+FINER = (0.6, 0.8, 1.0, 1.25, 1.6)  # of the best shape on the grid: the second look
+LEAST_GAIN = 0.002  # of the residual of all joints, for one joint to take another form than most
+_SWEEPS = 2
+_RIDGE = 1e-7  # on columns of unit norm: a form that the motion never shows must not spoil the factor
+
+
+def chosen_form(
+    model: TorqueModel,
+    base: BaseParameters,
+    forms: Sequence[Term],
+    recordings: Sequence[Recording],
+    processing: Processing,
+) -> Term:
+    """Return the mixture of `forms` of one of the model's terms that leaves the least residual.
+
+    Parameters
+    ----------
+    base : of the model with the term in any of its forms
+
+    A shape that is one number a joint is then looked at more closely around the best of its forms.
+    """
+    best = _mixture(model, base, forms, recordings, processing)
+    if not isinstance(best, ShapedTerm):
+        return best
+    closer = [best.with_shape([factor * value for value in best.shape]) for factor in FINER]
+    return _mixture(model, base, closer, recordings, processing)
+
+
+def _mixture(
+    model: TorqueModel,
+    base: BaseParameters,
+    forms: Sequence[Term],
+    recordings: Sequence[Recording],
+    processing: Processing,
+) -> Term:
+    choice = _choice(model, base, forms, recordings, processing)
+    alike = [choice.residual([form] * model.robot.n_v) for form in range(len(forms))]
+    picks, level = [int(np.argmin(alike))] * model.robot.n_v, min(alike)
+    for _ in range(_SWEEPS):
+        before = list(picks)
+        for joint in choice.joints:
+            tried = [choice.residual([*picks[:joint], pick, *picks[joint + 1 :]]) for pick in range(len(forms))]
+            if min(tried) < (1.0 - LEAST_GAIN) * level:
+                picks[joint], level = int(np.argmin(tried)), min(tried)
+        if picks == before:
+            break
+    return forms[0].mixed(forms, picks)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Choice:
+    """The weighted triangle of all columns, and which of them belong to which form.
+
+    triangle : (n, n + 1) with columns of unit norm and the torque last
+    rest : columns of the other terms
+    owned : per joint and form, the form's columns
+    joints : those that have the term
+    """
+
+    triangle: FloatArray
+    rest: IntArray
+    owned: tuple[tuple[IntArray, ...], ...]
+    joints: tuple[int, ...]
+
+    def residual(self, picks: Sequence[int]) -> float:
+        """Return the weighted residual when joint j takes form `picks[j]`."""
+        own = [self.owned[joint][picks[joint]] for joint in self.joints]
+        columns = np.concatenate([self.rest, *own, [self.triangle.shape[1] - 1]])
+        count = columns.size - 1
+        damped = np.vstack([self.triangle[:, columns], _RIDGE * np.eye(count, count + 1)])
+        reduced = np.asarray(np.linalg.qr(damped, mode="r"))
+        return abs(float(reduced[count, count]))
+
+
+def _choice(
+    model: TorqueModel,
+    base: BaseParameters,
+    forms: Sequence[Term],
+    recordings: Sequence[Recording],
+    processing: Processing,
+) -> _Choice:
+    key = forms[0].key
+    place = next(index for index, term in enumerate(model.terms) if term.key == key)
+    bank = Bank(forms=tuple(forms))
+    banked = replace(model, terms=(*model.terms[:place], bank, *model.terms[place + 1 :]))
+    start = sum(len(term.parameters(model.robot)) for term in model.terms[:place])
+    size = len(forms[0].parameters(model.robot))
+    more = size * (len(forms) - 1)
+    others = base.independent[(base.independent < start) | (base.independent >= start + size)]
+    moved = np.where(others < start, others, others + more)
+    kept = np.sort(np.concatenate([moved, np.arange(start, start + size + more)]))
+    wide = _kept_set(banked, kept)
+    evidence = collect_all(banked, wide, recordings, processing, most_blocks=1)
+    supports = forms[0].support(model.robot)
+    owned = tuple(
+        tuple(np.searchsorted(kept, start + form * size + support) for form in range(len(forms)))
+        for support in supports
+    )
+    return _Choice(
+        triangle=_weighted_triangle(evidence),
+        rest=np.searchsorted(kept, moved),
+        owned=owned,
+        joints=tuple(joint for joint, support in enumerate(supports) if support.size),
+    )
+
+
+def _kept_set(model: TorqueModel, kept: IntArray) -> BaseParameters:
+    """Return the kept columns as if they were a base set: forms of one term need not be independent."""
+    names = tuple(parameter.name for parameter in model.parameters)
+    nothing = np.zeros(0, dtype=np.intp)
+    return BaseParameters(
+        names=names,
+        independent=kept,
+        dependent=nothing,
+        regrouping=np.zeros((kept.size, 0)),
+        unidentifiable=np.setdiff1d(np.arange(len(names)), kept),
+    )
+
+
+def _weighted_triangle(evidence: Evidence) -> FloatArray:
+    """Return the triangle of all joints, each divided by the residual that all columns together leave on it."""
+    torque = joint_torques(evidence)
+    floor = np.maximum(1e-6 * torque.max(), np.finfo(float).tiny)
+    stacked, norms = _scaled_rows(evidence, 1.0 / np.maximum(torque, floor))
+    values = np.linalg.lstsq(stacked[:, :-1], stacked[:, -1], rcond=_RIDGE)[0] / norms
+    weights = 1.0 / np.maximum(joint_residuals(evidence, values), floor)
+    return np.asarray(np.linalg.qr(_scaled_rows(evidence, weights)[0], mode="r"))
+
+
+def _scaled_rows(evidence: Evidence, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the weighted factors of all joints stacked, columns of unit norm and the torque last, and the norms."""
+    rows = []
+    for joint, factor in enumerate(evidence.total.factors):
+        row = np.zeros((factor.shape[0], evidence.n_b + 1))
+        row[:, evidence.supports[joint]] = weights[joint] * factor[:, :-1]
+        row[:, -1] = weights[joint] * factor[:, -1]
+        rows.append(row)
+    stacked = np.vstack(rows)
+    norms = np.linalg.norm(stacked[:, :-1], axis=0)
+    norms = np.where(norms > 0, norms, 1.0)
+    stacked[:, :-1] /= norms
+    return stacked, norms
