@@ -64,6 +64,10 @@ class SimulationError(TauhatError):
     """A simulated experiment that cannot be run or went unstable."""
 
 
+class ExportError(TauhatError):
+    """A model that cannot be written for another program: no body, no word for it there, another robot's file."""
+
+
 class OutputError(TauhatError):
     """A file that could not be written; nothing half-written is left behind."""
 

@@ -7,7 +7,7 @@ import pytest
 
 from tauhat.dynamics.model import TorqueModel, torque_model
 from tauhat.dynamics.rigid_body import inverse_dynamics
-from tauhat.errors import ModelError
+from tauhat.errors import SimulationError
 from tauhat.estimation.estimate import Estimate
 from tauhat.estimation.identify import identify
 from tauhat.excitation.fourier import random_fourier
@@ -91,8 +91,8 @@ def test_a_parameter_that_the_simulation_does_not_know_is_refused(simulated: tup
     @dataclass(frozen=True, slots=True, kw_only=True)
     class Wind(Offset):
         key: ClassVar[str] = "wind"
-        symbol: ClassVar[str] = "Wi"
+        symbols: ClassVar[tuple[str, ...]] = ("Wi",)
 
     model, simulation = simulated
-    with pytest.raises(ModelError, match="no such parameter; got Wi"):
+    with pytest.raises(SimulationError, match="no such parameter; got Wi"):
         standard_parameters(TorqueModel(robot=model.robot, terms=(Wind(),)), simulation.truth.parameters)

@@ -12,7 +12,21 @@ import typer
 
 import tauhat
 from tauhat.cli.adapter import as_command
-from tauhat.cli.commands import check, demo, excite, identify, inspect, report, robots, simulate, verify, view
+from tauhat.cli.commands import (
+    calibrate_drives,
+    check,
+    demo,
+    excite,
+    export,
+    identify,
+    inspect,
+    payload,
+    report,
+    robots,
+    simulate,
+    verify,
+    view,
+)
 from tauhat.cli.reporting import ReportingGroup
 
 app = typer.Typer(
@@ -32,7 +46,10 @@ app.command("excite")(as_command(excite.run, excite.Options))
 app.command("simulate")(as_command(simulate.run, simulate.Options))
 app.command("identify")(as_command(identify.run, identify.Options))
 app.command("verify")(as_command(verify.run, verify.Options))
+app.command("payload")(as_command(payload.run, payload.Options))
+app.command("calibrate-drives")(as_command(calibrate_drives.run, calibrate_drives.Options))
 app.command("report")(as_command(report.run, report.Options))
+app.command("export")(as_command(export.run, export.Options))
 app.command("view")(as_command(view.run, view.Options))
 
 

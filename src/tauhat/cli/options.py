@@ -11,7 +11,7 @@ import typer
 
 from tauhat.errors import TauhatError
 
-TERM_NAMES = "inertia,rotor,viscous,coulomb,offset"
+TERM_NAMES = "plain"
 
 
 class Window(NamedTuple):
@@ -112,7 +112,15 @@ CutoffOption: TypeAlias = Annotated[
     ),
 ]
 ModelOption: TypeAlias = Annotated[
-    str, typer.Option("--model", metavar="TERMS", help="Terms of the torque model, comma separated.")
+    str, typer.Option("--model", metavar="TERMS", help="plain, robust, or terms with commas between.")
+]
+FittedModelOption: TypeAlias = Annotated[
+    str,
+    typer.Option(
+        "--model",
+        metavar="TERMS",
+        help="robust, plain, auto (terms by cross-validation), terms with commas between, or a TOML file.",
+    ),
 ]
 LockOption: TypeAlias = Annotated[
     Locks | None,
@@ -132,6 +140,16 @@ PeriodOption: TypeAlias = Annotated[
         min=0.0,
         help="Length of a repeated motion: its periods are averaged, the first is left out.",
         show_default="not averaged",
+    ),
+]
+MotionOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--motion",
+        metavar="MOTION",
+        help="Motion file written by `tauhat excite`: .parquet, .csv or .csv.gz.",
+        show_default=False,
+        readable=False,
     ),
 ]
 SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]

@@ -4,21 +4,32 @@ from tauhat.simulation.experiment import ExperimentSettings, Simulation, Truth, 
 from tauhat.simulation.gains import tracking_gains
 from tauhat.simulation.parameters import TrueParameters, nominal_parameters, perturbed
 from tauhat.simulation.plant import Plant, build_plant, plant_gravity_torque
+from tauhat.simulation.running import Reaction, RunningPlant, started
 from tauhat.simulation.sensors import Measured, SensorErrors, measure
+from tauhat.simulation.truth_file import load_true_parameters
+from tauhat.simulation.typical import KINDS, matching_model, typical_plant, with_true_shapes
 
 __all__ = [
+    "KINDS",
     "ExperimentSettings",
     "Measured",
     "Plant",
+    "Reaction",
+    "RunningPlant",
     "SensorErrors",
     "Simulation",
     "TrueParameters",
     "Truth",
     "build_plant",
+    "load_true_parameters",
+    "matching_model",
     "measure",
     "nominal_parameters",
     "perturbed",
     "plant_gravity_torque",
     "simulate",
+    "started",
     "tracking_gains",
+    "typical_plant",
+    "with_true_shapes",
 ]

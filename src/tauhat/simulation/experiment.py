@@ -16,13 +16,16 @@ from tauhat.errors import SimulationError, TauhatWarning
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
 from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot
+from tauhat.robots.shared_motor import SharedMotor
 from tauhat.simulation.gains import tracking_gains
+from tauhat.simulation.laws import SharedDrive
 from tauhat.simulation.parameters import TrueParameters
 from tauhat.simulation.plant import Plant, build_plant, load_mujoco, plant_gravity_torque
+from tauhat.simulation.running import RunningPlant, started
 from tauhat.simulation.sensors import SensorErrors, measure
 
 _RUNAWAY = 1e3  # [rad/s or m/s] no robot moves this fast: the simulation has diverged
-_LOGGED = ("q", "dq", "ddq", "tau", "coulomb_torque")
+_LOGGED = ("q", "dq", "ddq", "tau", "coulomb_torque", "law_torque")
 _WHOLE = 1e-6  # how far a ratio of rates may be from a whole number
 
 
@@ -72,13 +75,14 @@ class ExperimentSettings:
 class Truth:
     """What the sensors cannot show, at the samples of the recording; (n_t, n_v) arrays.
 
-    At every sample `tau = inverse dynamics(q, dq, ddq) + rotor ddq + viscous dq + coulomb_torque + offset` exactly:
-    ddq is the acceleration at the state (q, dq) under the motor torque tau.
+    At every sample `tau = inverse dynamics(q, dq, ddq) + rotor ddq + viscous dq + coulomb_torque + law_torque + offset`
+    exactly: ddq is the acceleration at the state (q, dq) under the motor torque tau.
 
     parameters : of the plant; an offset of the torque sensor is not among them
     q, dq, ddq : [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
     tau : motor torque [Nm or N]
     coulomb_torque : the part of tau that dry friction takes, `coulomb sign(dq)` while the joint moves [Nm or N]
+    law_torque : the part that the plant's passive laws and shared motors take [Nm or N]
     reference : the motion that was asked for
     """
 
@@ -88,6 +92,7 @@ class Truth:
     ddq: FloatArray
     tau: FloatArray
     coulomb_torque: FloatArray
+    law_torque: FloatArray
     reference: MotionSamples
 
 
@@ -144,9 +149,20 @@ def simulate(
         parameters=plant.parameters, reference=motion.sample(t), **{name: read_only(log[name]) for name in log}
     )
     recording = Recording(
-        t=t, q=shown.q, dq=shown.dq, tau=shown.tau, joint_names=robot.joint_names, name=f"{robot.name} simulated"
+        t=t,
+        q=shown.q,
+        dq=shown.dq,
+        tau=shown.tau,
+        joint_names=robot.joint_names,
+        name=f"{robot.name} simulated",
+        shared_motors=_shared_motors(plant.parameters),
     )
     return Simulation(recording=recording, truth=truth)
+
+
+def _shared_motors(parameters: TrueParameters) -> tuple[SharedMotor, ...]:
+    drives = [law for law in parameters.laws if isinstance(law, SharedDrive)]
+    return tuple(SharedMotor(drive.own, drive.other, drive.ratio) for drive in drives)
 
 
 def _control_clock(motion: Trajectory, settings: ExperimentSettings) -> FloatArray:
@@ -160,9 +176,8 @@ def _run(
 ) -> dict[str, FloatArray]:
     """Return the truth at the samples of the log, after the robot has settled in the start pose."""
     mujoco = load_mujoco()
-    data = mujoco.MjData(plant.model)
-    data.qpos[plant.dof] = reference.q[0]
-    stepper = _Stepper(mujoco=mujoco, plant=plant, data=data, law=law, substeps=settings.substeps)
+    running = started(plant, reference.q[0])
+    stepper = _Stepper(running=running, law=law, substeps=settings.substeps)
     log = np.empty(((reference.n_t - 1) // settings.stride + 1, len(_LOGGED), plant.robot.n_v))
     hold = np.zeros(plant.robot.n_v)
     with _silent(mujoco):
@@ -179,36 +194,28 @@ def _run(
 class _Stepper:
     """One control period of a plant under a control law."""
 
-    mujoco: Any
-    plant: Plant
-    data: Any
+    running: RunningPlant
     law: PDGravity
     substeps: int
 
     def advance(
         self, q_ref: FloatArray, dq_ref: FloatArray, gravity_torque: FloatArray, t: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return q, dq, ddq, tau and Coulomb torque at the begin of the period, and pass it."""
-        data, dof, model = self.data, self.plant.dof, self.plant.model
-        q, dq = data.qpos[dof], data.qvel[dof]
+    ) -> tuple[FloatArray, ...]:
+        """Return the log's channels at the begin of the period, and pass it."""
+        q, dq = self.running.state
         if not dq @ dq < _RUNAWAY**2:
             self._report_runaway(dq, t)
         tau = self.law.torque(q, dq, q_ref=q_ref, dq_ref=dq_ref, gravity_torque=gravity_torque)
-        data.qfrc_applied[dof] = tau - self.plant.parameters.offset
-        # mj_step first computes the acceleration at the present state and leaves it in qacc, then integrates:
-        # what is read after a single step belongs to the state read before it.
-        self.mujoco.mj_step(model, data)
-        ddq, coulomb_torque = data.qacc[dof], -data.qfrc_constraint[dof]
-        if self.substeps > 1:
-            self.mujoco.mj_step(model, data, self.substeps - 1)
-        return q, dq, ddq, tau, coulomb_torque
+        ddq, coulomb_torque, law_torque = self.running.advance(tau, self.substeps)
+        return q, dq, ddq, tau, coulomb_torque, law_torque
 
     def _report_runaway(self, dq: FloatArray, t: float) -> None:
         worst = int(np.argmax(np.where(np.isfinite(dq), np.abs(dq), np.inf)))
-        joint = self.plant.robot.joints[worst]
+        robot = self.running.plant.robot
+        joint = robot.joints[worst]
         raise SimulationError(
             "the simulated robot went unstable",
-            where=f"{self.plant.robot.name}, joint {joint.name}",
+            where=f"{robot.name}, joint {joint.name}",
             got=f"{dq[worst]:.3g} {joint.unit}/s at t = {t:.4g} s",
             remedy="lower the controller's gains, raise the control rate or shorten the timestep",
         )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,17 +14,22 @@ from tauhat.robots.inertia_checks import inertia_defect
 from tauhat.robots.joint import central_inertia, inertia_at_origin
 from tauhat.robots.robot import Robot
 from tauhat.robots.transforms import rotation_about
+from tauhat.simulation.laws import LAWS, PassiveLaw, law_from_dict
 
+SYMBOLS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+DRIVES: Mapping[str, str] = {"Ia": "rotor", "Fv": "viscous", "Fc": "coulomb", "To": "offset"}
+_OF_LAWS = {letter for law in LAWS.values() for letter in law.letters.values()}
 _THINNEST = 1e-6  # smallest spread of a perturbed body along a principal axis, relative to all three
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TrueParameters:
-    """What the plant is made of: `tau = inertia(q, dq, ddq) + rotor ddq + viscous dq + coulomb sign(dq) + offset`.
+    """What the plant is made of: `tau = rigid(q, dq, ddq) + rotor ddq + viscous dq + coulomb sign(dq) + offset + laws`.
 
     inertia : (n_v, 10) `m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz` about the joint frames [kg, kg m, kg m^2]
     rotor : (n_v,) rotor inertia on the joint side [kg m^2 or kg]
     viscous, coulomb, offset : (n_v,) [Nm s/rad, Nm, Nm] or [N s/m, N, N]
+    laws : friction of other kinds, springs and shared motors, added to these
     """
 
     inertia: FloatArray
@@ -30,6 +37,7 @@ class TrueParameters:
     viscous: FloatArray
     coulomb: FloatArray
     offset: FloatArray
+    laws: tuple[PassiveLaw, ...] = ()
 
     def __post_init__(self) -> None:
         inertia = frozen("inertia", self.inertia, (None, 10), where="true parameters")
@@ -40,11 +48,50 @@ class TrueParameters:
             if name != "offset" and values.min() < 0.0:
                 joint = int(np.argmin(values)) + 1
                 raise SimulationError(f"{name} is negative", where=f"true parameters, joint {joint}", got=values.min())
+        object.__setattr__(self, "laws", tuple(self.laws))
+        for law in self.laws:
+            law.check(self.n_v)
 
     @property
     def n_v(self) -> int:
         """Number of joints."""
         return int(self.inertia.shape[0])
+
+    def value(self, symbol: str, joint: int) -> float:
+        """Return the true value of a standard parameter; zero where the plant has nothing of the kind.
+
+        Raises
+        ------
+        SimulationError
+            when no plant has a parameter of this symbol.
+        """
+        if symbol not in {*SYMBOLS, *DRIVES, *_OF_LAWS}:
+            raise SimulationError("the simulation has no such parameter", got=symbol)
+        if symbol in SYMBOLS:
+            return float(self.inertia[joint, SYMBOLS.index(symbol)])
+        own = float(getattr(self, DRIVES[symbol])[joint]) if symbol in DRIVES else 0.0
+        return own + sum(law.true_values().get((symbol, joint), 0.0) for law in self.laws)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data that `from_dict` reads back exactly."""
+        arrays = {name: getattr(self, name).tolist() for name in ("inertia", *DRIVES.values())}
+        return arrays | {"laws": [law.to_dict() for law in self.laws]}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> TrueParameters:
+        """Return the parameters that `to_dict` described.
+
+        Raises
+        ------
+        SimulationError
+            when a field is missing or a law is unknown.
+        """
+        try:
+            arrays = {name: data[name] for name in ("inertia", *DRIVES.values())}
+            laws = tuple(law_from_dict(law) for law in data["laws"])
+        except (KeyError, TypeError, AttributeError) as error:
+            raise SimulationError("true parameters are damaged", got=f"{type(error).__name__}: {error}") from error
+        return cls(**arrays, laws=laws)
 
 
 def nominal_parameters(robot: Robot) -> TrueParameters:

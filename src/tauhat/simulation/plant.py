@@ -11,6 +11,7 @@ from tauhat.arrays import FloatArray, IntArray, frozen
 from tauhat.errors import MissingExtraError, SimulationError
 from tauhat.robots.joint import Joint
 from tauhat.robots.robot import Robot
+from tauhat.simulation.laws import SharedDrive
 from tauhat.simulation.parameters import TrueParameters, nominal_parameters, principal_body
 
 # Coulomb friction is MuJoCo's friction-loss constraint, made nearly rigid: time constant of two steps (the shortest
@@ -19,8 +20,8 @@ from tauhat.simulation.parameters import TrueParameters, nominal_parameters, pri
 # 4e-3 rad/s. With MuJoCo's default softness it differs up to 0.1 rad/s and a loaded joint creeps. A smooth sign as
 # applied torque is the worse truth: explicit, it is stable only with a width above timestep * coulomb / inertia (0.05
 # rad/s for 2 Nm on 0.02 kg m^2), and it can never hold a joint still.
-_FRICTION_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-_FRICTION_TIME_STEPS = 2.0
+FRICTION_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+FRICTION_TIME_STEPS = 2.0
 # Costs nothing at one iteration a step; with MuJoCo's 1e-8 single samples miss the equation of motion by up to 4e-3.
 _SOLVER_TOLERANCE = 1e-15
 
@@ -128,12 +129,22 @@ def _specification(mujoco: Any, robot: Robot, parameters: TrueParameters, timest
         _add_joint(mujoco, body, joint, index)
         _set_inertia(mujoco, body, parameters.inertia[index], joint.name)
         bodies.append(body)
+    for law in parameters.laws:
+        if isinstance(law, SharedDrive):
+            _add_shared_rotor(specification, law)
     return specification
 
 
 def _add_joint(mujoco: Any, body: Any, joint: Joint, index: int) -> None:
     kinds = {"revolute": mujoco.mjtJoint.mjJNT_HINGE, "prismatic": mujoco.mjtJoint.mjJNT_SLIDE}
     body.add_joint(name=_joint_name(index), type=kinds[joint.kind], axis=joint.axis)
+
+
+def _add_shared_rotor(specification: Any, drive: SharedDrive) -> None:
+    """Add a rotor that turns with two joints: the armature of a tendon whose length is the motor's position."""
+    tendon = specification.add_tendon(armature=drive.inertia)
+    tendon.wrap_joint(_joint_name(drive.own), 1.0)
+    tendon.wrap_joint(_joint_name(drive.other), drive.ratio)
 
 
 def _set_inertia(mujoco: Any, body: Any, inertia: FloatArray, link: str) -> None:
@@ -157,8 +168,8 @@ def _set_drives(mujoco: Any, model: Any, dof: IntArray, parameters: TrueParamete
     model.dof_armature[dof] = parameters.rotor
     model.dof_damping[dof] = parameters.viscous
     model.dof_frictionloss[dof] = parameters.coulomb
-    model.dof_solref[:] = (_FRICTION_TIME_STEPS * model.opt.timestep, 1.0)
-    model.dof_solimp[:] = _FRICTION_IMPEDANCE
+    model.dof_solref[:] = (FRICTION_TIME_STEPS * model.opt.timestep, 1.0)
+    model.dof_solimp[:] = FRICTION_IMPEDANCE
     # Constants that depend on the inertias, the scale of the friction constraint among them.
     mujoco.mj_setConst(model, mujoco.MjData(model))
 

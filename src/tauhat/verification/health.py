@@ -198,13 +198,7 @@ def _nominal_agreement(look: _Look) -> FloatArray:
 def _friction_power(look: _Look) -> FloatArray:
     """Return each joint's identified friction torque at its root mean square speed, (n_v,)."""
     speed = np.sqrt(np.mean(look.dq**2, axis=0))
-    friction = np.zeros(speed.size)
-    parameters = look.model.parameters
-    for index, value in zip(look.base.independent, look.estimate.values, strict=True):
-        parameter = parameters[index]
-        if parameter.symbol in {"Fv", "Fc"}:
-            friction[parameter.joint] += value * (speed[parameter.joint] if parameter.symbol == "Fv" else 1.0)
-    return friction
+    return look.estimate.friction(speed).torque
 
 
 def _delay_findings(look: _Look) -> tuple[Finding, ...]:
@@ -229,7 +223,7 @@ def _excitation_findings(look: _Look) -> tuple[Finding, ...]:
     estimate = look.estimate
     weak = [row for row in estimate.summary() if row.relative > WEAK_PARAMETER]
     names = ", ".join(row.name for row in sorted(weak, key=lambda row: -row.relative)[:6])
-    unseen = estimate.base.n_b - estimate.rank
+    unseen = estimate.n_fitted - estimate.rank
     number = estimate.condition
     if unseen > 0 or number > DOUBTFUL_CONDITION:
         lost = f"{unseen} of {estimate.base.n_b} base parameters cannot be seen at all; " if unseen else ""

@@ -13,7 +13,7 @@ from tauhat.blas import single_threaded
 from tauhat.errors import ModelError
 from tauhat.estimation.estimate import Estimate, InputLog, input_log
 from tauhat.estimation.rows import filtered_rows
-from tauhat.recordings.processing import Processing
+from tauhat.recordings.processing import STANDSTILL, Processing
 from tauhat.recordings.recording import Recording
 from tauhat.robots.joint import Joint
 
@@ -50,6 +50,7 @@ class LogPrediction:
 
     input : which file and rows were predicted
     relative_rms, rms, r2 : all joints stacked
+    moving_relative_rms : relative_rms over the rows in which some joint is faster than 2 % of its top speed
     t : (n,) [s]; tau, predicted, dq : (n, n_v), filtered and decimated, standstill at both ends left out
     """
 
@@ -58,6 +59,7 @@ class LogPrediction:
     relative_rms: float
     rms: float
     r2: float
+    moving_relative_rms: float
     joints: tuple[JointError, ...]
     t: FloatArray
     tau: FloatArray
@@ -82,7 +84,8 @@ class LogPrediction:
             for joint in self.joints
         ]
         return {
-            "log": self.log, "relative_rms": self.relative_rms, "rms": self.rms, "r2": self.r2, "joints": joints,
+            "log": self.log, "relative_rms": self.relative_rms, "rms": self.rms, "r2": self.r2,
+            "moving_relative_rms": self.moving_relative_rms, "joints": joints,
         }  # fmt: skip
 
 
@@ -155,6 +158,7 @@ class _Series(NamedTuple):
 def _log_prediction(estimate: Estimate, log: InputLog, series: _Series) -> LogPrediction:
     t, tau, predicted, dq = series
     error = tau - predicted
+    moving = (np.abs(dq) > STANDSTILL * np.abs(dq).max(axis=0)).any(axis=1)
     joints = tuple(_joint_error(joint, series.of_joint(k)) for k, joint in enumerate(estimate.robot.joints))
     return LogPrediction(
         log=log.name,
@@ -162,6 +166,7 @@ def _log_prediction(estimate: Estimate, log: InputLog, series: _Series) -> LogPr
         relative_rms=_ratio(error, tau),
         rms=float(np.sqrt(np.mean(error**2))),
         r2=_r2(error, tau),
+        moving_relative_rms=_ratio(error[moving], tau[moving]),
         joints=joints,
         t=read_only(t),
         tau=read_only(tau),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +10,6 @@ from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, read_only
 from tauhat.dynamics.model import TorqueModel
-from tauhat.dynamics.terms import INERTIAL_SYMBOLS
-from tauhat.errors import ModelError
 from tauhat.estimation.estimate import Estimate
 from tauhat.recordings.recording import Recording
 from tauhat.simulation.experiment import Truth
@@ -20,7 +17,6 @@ from tauhat.simulation.parameters import TrueParameters
 from tauhat.verification.prediction import predict_recording
 
 CONFIDENCE = 0.95
-_DRIVE_SYMBOLS: Mapping[str, str] = {"Ia": "rotor", "Fv": "viscous", "Fc": "coulomb", "To": "offset"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,18 +56,10 @@ def standard_parameters(model: TorqueModel, truth: TrueParameters) -> FloatArray
 
     Raises
     ------
-    ModelError
+    SimulationError
         when the model has a parameter that the simulation knows nothing of.
     """
-    return np.array([_true_value(truth, parameter.symbol, parameter.joint) for parameter in model.parameters])
-
-
-def _true_value(truth: TrueParameters, symbol: str, joint: int) -> float:
-    if symbol in INERTIAL_SYMBOLS:
-        return float(truth.inertia[joint, INERTIAL_SYMBOLS.index(symbol)])
-    if symbol in _DRIVE_SYMBOLS:
-        return float(getattr(truth, _DRIVE_SYMBOLS[symbol])[joint])
-    raise ModelError("the simulation has no such parameter", got=symbol)
+    return np.array([truth.value(parameter.symbol, parameter.joint) for parameter in model.parameters])
 
 
 def compare_with_truth(estimate: Estimate, truth: Truth) -> TruthComparison:

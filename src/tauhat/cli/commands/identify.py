@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tauhat.cli.options import (
-    TERM_NAMES,
     CutoffOption,
+    FittedModelOption,
     JsonOption,
     LockOption,
     LogArguments,
     MapOption,
-    ModelOption,
     PeriodOption,
     RobotArgument,
     RowsOption,
@@ -24,13 +23,15 @@ from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from rich.console import RenderableType
 
+    from tauhat.dynamics.model import TorqueModel
     from tauhat.estimation.estimate import Estimate
+    from tauhat.recordings.recording import Recording
 
-_SHOWN = ("tauhat_version", "fingerprint", "parameters", "fit", "processing", "inputs")
+_SHOWN = ("tauhat_version", "fingerprint", "parameters", "fit", "structure", "physical", "processing", "inputs")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,8 +44,15 @@ class Options:
         Path, typer.Option("-o", "--output", metavar="ESTIMATE.json", help="File to write.", show_default=False)
     ]
     map_file: MapOption = None
-    model: ModelOption = TERM_NAMES
+    model: FittedModelOption = "robust"
     estimator: Annotated[str, typer.Option("--estimator", metavar="NAME", help="Estimator: wls or ols.")] = "wls"
+    physical: Annotated[
+        bool,
+        typer.Option("--physical", help="Keep every link a possible body, friction positive; gives all parameters."),
+    ] = False
+    essential: Annotated[
+        bool, typer.Option("--essential", help="Drop the parameters that the recordings cannot see.")
+    ] = False
     cutoff: CutoffOption = None
     rows: RowsOption = None
     period: PeriodOption = None
@@ -55,12 +63,11 @@ class Options:
 def run(options: Options) -> None:
     """Identify a robot's torque model from recordings and write it as an estimate file."""
     from tauhat.cli.inputs import averaged, read_recordings, robot_of_recordings
-    from tauhat.dynamics.model import torque_model
-    from tauhat.estimation.identify import identify
+    from tauhat.cli.models import model_of
     from tauhat.estimation.least_squares import estimator_named
     from tauhat.files import check_output
 
-    estimator = estimator_named(options.estimator)
+    estimator_named(options.estimator)
     check_output(
         options.output, inputs=[options.robot, *options.logs, *([options.map_file] if options.map_file else [])]
     )
@@ -68,11 +75,32 @@ def run(options: Options) -> None:
         measured = read_recordings(options.logs, map_file=options.map_file, rows=options.rows)
         recordings = averaged(measured, period=options.period)
         robot = robot_of_recordings(options.robot, recordings, locked=options.lock)
-        model = torque_model(robot, options.model)
+        model = model_of(robot, options.model, recordings)
     with working("identifying"):
-        estimate = identify(model, recordings, estimator=estimator, cutoff=options.cutoff)
+        estimate = _identified(model, recordings, options)
     estimate.save(options.output)
     show(_document(estimate, options.output), lambda: _view(estimate, options), as_json=options.as_json)
+
+
+def _identified(model: TorqueModel, recordings: Sequence[Recording], options: Options) -> Estimate:
+    """Return the estimate, of the model that cross-validation chose where that was asked for."""
+    from tauhat.cli.models import AUTO
+    from tauhat.estimation.essential import EssentialLeastSquares
+    from tauhat.estimation.identify import identify
+    from tauhat.estimation.least_squares import estimator_named
+    from tauhat.estimation.physical_constraints import PhysicalConstraints
+    from tauhat.estimation.structure import select_model
+
+    named = estimator_named(options.estimator)
+    estimator = EssentialLeastSquares(inner=named) if options.essential else named
+    constraints = PhysicalConstraints() if options.physical else None
+    if options.model.strip() != AUTO:
+        return identify(model, recordings, estimator=estimator, cutoff=options.cutoff, constraints=constraints)
+    chosen = select_model(model, recordings, estimator=estimator, cutoff=options.cutoff)
+    estimate = identify(
+        chosen.model, recordings, estimator=estimator, processing=chosen.processing, constraints=constraints
+    )
+    return replace(estimate, structure=chosen.structure)
 
 
 def _document(estimate: Estimate, path: Path) -> dict[str, Any]:

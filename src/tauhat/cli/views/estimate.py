@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from tauhat.cli.views.tables import aligned, graded, table
@@ -10,19 +10,17 @@ from tauhat.cli.views.tables import aligned, graded, table
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tauhat.estimation.estimate import Estimate, ParameterRow
+    from tauhat.estimation.estimate import Estimate
 
 _WELL_KNOWN = 0.1  # relative standard error below which a parameter is called well known
-_DRIVE = ("Fc", "Fv", "To")
+_SPEEDS = (0.05, 0.5)  # parts of the top speed that friction is shown at
 
 
 def estimate_view(estimate: Estimate) -> Iterator[RenderableType]:
     """Yield the fit joint by joint, what drives the joints, and how far the parameters can be trusted."""
     yield _fit_table(estimate)
-    rows = {row.name: row for row in estimate.summary()}
-    symbols = [symbol for symbol in _DRIVE if f"{symbol}_1" in rows]
-    if symbols:
-        yield _drive_table(estimate, rows, symbols)
+    if any(term.dissipates for term in estimate.model.terms):
+        yield _friction_table(estimate)
     yield _sentences(estimate)
 
 
@@ -41,37 +39,66 @@ def _fit_table(estimate: Estimate) -> RenderableType:
     return made
 
 
-def _drive_table(estimate: Estimate, rows: dict[str, ParameterRow], symbols: Sequence[str]) -> RenderableType:
+def _friction_table(estimate: Estimate) -> RenderableType:
+    """Return friction in steady motion at low and high speed: it means the same whatever terms make it."""
+    import numpy as np
     from rich.markup import escape
 
-    joints = range(1, estimate.robot.n_v + 1)
+    limits = np.where(np.isfinite(estimate.robot.velocity_limit), estimate.robot.velocity_limit, 1.0)
+    levels = [(part, estimate.friction(part * np.where(limits > 0, limits, 1.0))) for part in _SPEEDS]
     headers, columns = [], []
-    for symbol in symbols:
-        own = [rows[f"{symbol}_{joint}"] for joint in joints]
-        errors = [row.standard_error for row in own]
-        units = " or ".join(dict.fromkeys(row.unit for row in own))
-        headers += [f"{symbol}\n[{units}]", "± se\n"]
-        columns += [aligned([row.value for row in own], like=errors), aligned(errors)]
-    made = table("Friction (Coulomb, viscous) and offset with standard errors", ("joint",), tuple(headers))
+    for part, friction in levels:
+        headers += [f"at {100 * part:.0f} %\nof top speed", "± se\n"]
+        errors = friction.standard_errors.tolist()
+        columns += [aligned(friction.torque.tolist(), like=errors), aligned(errors)]
+    made = table("Friction in steady motion, with standard errors", ("joint", "unit"), tuple(headers))
     for joint, *figures in zip(estimate.robot.joints, *columns, strict=True):
-        made.add_row(escape(joint.name), *figures)
+        made.add_row(escape(joint.name), joint.effort_unit, *figures)
     return made
 
 
 def _sentences(estimate: Estimate) -> RenderableType:
     from rich.text import Text
 
-    from tauhat.report.grading import condition_grade
+    lines = (_terms(estimate), _source(estimate), _trust(estimate), _physics(estimate))
+    return Text("".join(f"{line}\n" for line in lines if line))
 
-    n_b, processing, inputs = estimate.base.n_b, estimate.processing, estimate.inputs
-    known = sum(row.relative < _WELL_KNOWN for row in estimate.summary())
-    grade = condition_grade(estimate.condition, full_rank=estimate.rank >= n_b)
+
+def _terms(estimate: Estimate) -> str:
+    terms = ", ".join(term.key for term in estimate.model.terms)
+    chosen = f" ({estimate.structure.words})" if estimate.structure else ""
+    return f"Terms: {terms}{chosen}."
+
+
+def _source(estimate: Estimate) -> str:
+    processing, inputs = estimate.processing, estimate.inputs
     delay = f", position taken as {processing.delay * 1e3:.3g} ms late" if processing.delay else ""
     logs = "one recording" if len(inputs) == 1 else f"{len(inputs)} recordings"
-    return Text(
+    return (
         f"From {logs} of {sum(log.seconds for log in inputs):.1f} s; low-pass {processing.cutoff:.3g} Hz, "
-        f"of the motion {processing.motion_cutoff:.3g} Hz; velocity from the measured {processing.velocity}{delay}.\n"
+        f"of the motion {processing.motion_cutoff:.3g} Hz; velocity from the measured {processing.velocity}{delay}."
+    )
+
+
+def _trust(estimate: Estimate) -> str:
+    from tauhat.report.grading import condition_grade
+
+    n_b, fitted = estimate.base.n_b, estimate.n_fitted
+    known = sum(row.relative < _WELL_KNOWN for row in estimate.summary())
+    dropped = f"; the other {n_b - fitted} cannot be seen in the recordings and are zero" if fitted < n_b else ""
+    grade = condition_grade(estimate.condition, full_rank=estimate.rank >= fitted)
+    return (
         f"{estimate.rank} of {n_b} base parameters determined, {known} of them to better than "
-        f"{100 * _WELL_KNOWN:.0f} % (standard error).\n"
-        f"Scaled condition number {estimate.condition:.3g}: {grade.meaning}.\n"
+        f"{100 * _WELL_KNOWN:.0f} % (standard error){dropped}.\n"
+        f"Scaled condition number {estimate.condition:.3g}: {grade.meaning}."
+    )
+
+
+def _physics(estimate: Estimate) -> str:
+    if estimate.physical is None:
+        return ""
+    held = "; ".join(estimate.physical["binding"][:3]) or "nothing"
+    return (
+        f"Every link is a possible body, which costs {100 * estimate.physical['cost']:.2f} % of the residual; "
+        f"held back most by {held}."
     )
