@@ -1,6 +1,7 @@
 """Prediction error on measured logs of eight real robots, beside the reference error of one plain baseline.
 
     python benchmarks/real.py [--json] [--data FOLDER] [--only TEXT] [--models plain,robust,auto,robust+physical]
+                              [--estimators wls,irls,...]
 
 Every case goes through the command line as a user would: `tauhat identify --model NAME` (and
 `--physical` for `NAME+physical`), then `tauhat verify` on logs
@@ -55,14 +56,15 @@ def arguments_of(logs: list[dict[str, str]], data: Path, case: dict[str, Any], m
     ]  # fmt: skip
 
 
-def run_case(case: dict[str, Any], data: Path, folder: Path, model: str) -> dict[str, Any]:
-    """Identify and verify one case with one model; return its errors."""
+def run_case(case: dict[str, Any], data: Path, folder: Path, model: str, estimator: str) -> dict[str, Any]:
+    """Identify and verify one case with one model and estimator; return its errors."""
     robot = EXAMPLES / case["robot"] if (EXAMPLES / case["robot"]).exists() else data / case["robot"]
     estimate = folder / "estimate.json"
     start = time.perf_counter()
     fitted = tauhat(
         "identify", str(robot), *arguments_of(case["fit"], data, case, case["map"]),
         "--model", model.removesuffix("+physical"), *(["--physical"] if model.endswith("+physical") else []),
+        "--estimator", estimator,
         "-o", str(estimate),
     )  # fmt: skip
     seconds = time.perf_counter() - start
@@ -77,7 +79,7 @@ def run_case(case: dict[str, Any], data: Path, folder: Path, model: str) -> dict
         "joints": [[joint["relative_rms"] for joint in log["joints"]] for log in logs], "seconds": seconds,
         "condition": stored["fit"]["condition"], "processing": stored["processing"], "warnings": warnings,
         "missing_warnings": [word for word in case.get("expect", ()) if word not in " ".join(warnings)],
-        "aim": case.get("aim"), "model": model, "waits": case.get("waits", ""),
+        "aim": case.get("aim"), "model": model, "estimator": estimator, "waits": case.get("waits", ""),
         "structure": stored["structure"],
     }  # fmt: skip
 
@@ -92,18 +94,24 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=default_data())
     parser.add_argument("--only", default="", help="only cases whose name contains this")
     parser.add_argument("--models", default="plain,robust,auto", help="models to compare")
+    parser.add_argument("--estimators", default="wls", help="estimators to compare")
     options = parser.parse_args()
     if not options.data.is_dir():
         raise SystemExit(f"{options.data}: no such folder; name the folder of the recordings with --data")
     cases = [case for case in read_cases() if options.only in case["name"]]
     models = options.models.split(",")
     with tempfile.TemporaryDirectory() as folder:
-        results = [run_case(case, options.data, Path(folder), model) for case in cases for model in models]
+        results = [
+            run_case(case, options.data, Path(folder), model, estimator)
+            for case in cases
+            for model in models
+            for estimator in options.estimators.split(",")
+        ]
     if options.json:
         print(json.dumps(results))
         return
     print(
-        f"{'fitted -> judged':34} {'model':16} {'reference %':>12} {'aim %':>6} {'here %':>12} {'moving rows':>12} {'verdict':>8} {'cond':>8} "
+        f"{'fitted -> judged':34} {'model':16} {'estimator':13} {'reference %':>12} {'aim %':>6} {'here %':>12} {'moving rows':>12} {'verdict':>8} {'cond':>8} "
         f"{'s':>5}  per joint %"
     )
     for row in results:
@@ -116,7 +124,7 @@ def show(row: dict[str, Any]) -> None:
     joints = " | ".join(" ".join(f"{100 * value:.0f}" for value in joints) for joints in row["joints"])
     aim = f"{100 * row['aim']:.1f}" if row["aim"] else ""
     print(
-        f"{row['name']:34} {row['model']:16} {percent(row['reference']):>12} {aim:>6} {percent(row['errors']):>12} "
+        f"{row['name']:34} {row['model']:16} {row['estimator']:13} {percent(row['reference']):>12} {aim:>6} {percent(row['errors']):>12} "
         f"{percent(row['moving']):>12} {verdict:>8} {row['condition']:8.3g} {row['seconds']:5.1f}  {joints}"
     )
     if row["waits"]:

@@ -12,8 +12,10 @@ import typer
 from typer.testing import CliRunner
 
 from tauhat.cli.app import app
+from tauhat.dynamics import load_model
 from tauhat.errors import ExcitationError
 from tauhat.estimation import load_estimate
+from tauhat.estimation.constraints_file import load_constraints
 from tauhat.excitation.limits.limits_file import parse_limits
 from tauhat.recordings import load_map, parse_map
 from tauhat.robots import load_robot, robot_from_dh
@@ -98,8 +100,16 @@ def test_the_base_parameters_shown_are_those_printed(capsys):
 
 @pytest.mark.filterwarnings("ignore::tauhat.errors.TauhatWarning")  # capsules of the limits page lie on other links
 @pytest.mark.parametrize("page", pages_with("toml"), ids=lambda page: page.stem)
-def test_maps_and_tables_shown_are_such(page):
+def test_maps_and_tables_shown_are_such(page, tmp_path):
+    shown = tmp_path / "shown.toml"
     for block in blocks(page, "toml"):
+        shown.write_text(block)
+        if "[[term]]" in block:
+            assert len(load_model(shown, load_robot("ur5e")).parameters) > 100
+            continue
+        if "[[link]]" in block:
+            assert load_constraints(shown).links[0].joint == "elbow_joint"
+            continue
         if "[[joints]]" in block:
             assert robot_from_dh(block).joint_names == ("shoulder", "elbow")
             continue

@@ -89,9 +89,10 @@ def test_the_seed_decides_what_is_simulated(tauhat: Tauhat, workshop: Workshop, 
 
 def test_identify_writes_an_estimate_near_the_truth(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:
     path = tmp_path / "e.json"
-    said = document(tauhat, "identify", "two_link", workshop.log, workshop.other_log, "-o", path)
+    said = document(tauhat, "identify", "two_link", workshop.log, workshop.other_log, "-o", path, "--model", "plain")
     assert said["estimate"] == str(path)
-    assert {"parameters", "fit", "processing", "inputs"} <= set(said)
+    assert {"parameters", "fit", "structure", "processing", "inputs"} <= set(said)
+    assert said["structure"] is None
     assert [log["name"] for log in said["inputs"]] == ["first", "second"]
     estimate = load_estimate(path)
     truth = json.loads((workshop.folder / "first.truth.json").read_text())["base_parameters"]
@@ -101,6 +102,61 @@ def test_identify_writes_an_estimate_near_the_truth(tauhat: Tauhat, workshop: Wo
         if row.name[:2] not in {"Fc", "To"}
     ]
     assert max(errors) < 4.5
+
+
+def test_identify_takes_the_robust_model_by_itself(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:
+    words = ("identify", "two_link", workshop.log, workshop.other_log, "-o", tmp_path / "e.json")
+    by_default = document(tauhat, *words)
+    named = document(tauhat, *words, "--model", "robust")
+    assert by_default["parameters"] == named["parameters"]
+    symbols = {parameter["name"].split("_")[0] for parameter in named["parameters"]}
+    assert {"Fv", "Fr", "Fs", "Fd", "Fe", "To"} <= symbols
+    assert document(tauhat, "verify", tmp_path / "e.json", workshop.text_log)["logs"][0]["relative_rms"] < 0.05
+
+
+def test_identify_tells_how_it_chose_the_terms_when_asked_to(
+    tauhat: Tauhat, workshop: Workshop, tmp_path: Path
+) -> None:
+    words = ("identify", "two_link", workshop.log, workshop.other_log, "-o", tmp_path / "e.json", "--model", "auto")
+    structure = document(tauhat, *words)["structure"]
+    assert (structure["folds"], structure["whole"]) == (2, True)
+    assert {"term", "change", "gain", "uncertainty", "taken"} == set(structure["trials"][0])
+    assert load_estimate(tmp_path / "e.json").structure is not None
+    shown = " ".join(tauhat(*words).stdout.split())
+    assert "left-out recordings" in shown
+    assert "How the terms were chosen" in report_of(tauhat, tmp_path / "e.json", tmp_path / "r.html")
+
+
+def report_of(tauhat: Tauhat, estimate: Path, page: Path) -> str:
+    document(tauhat, "report", estimate, "-o", page)
+    return page.read_text(encoding="utf-8")
+
+
+def test_identify_takes_a_model_file(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text('terms = "inertia,viscous"\n[[term]]\nterm = "coulomb"\nwidths = [0.02, 0.03]\n')
+    document(tauhat, "identify", "two_link", workshop.log, "-o", tmp_path / "e.json", "--model", model)
+    terms = {term.key: term for term in load_estimate(tmp_path / "e.json").model.terms}
+    assert list(terms) == ["inertia", "viscous", "coulomb"]
+    assert terms["coulomb"].widths == (0.02, 0.03)
+
+
+@pytest.mark.parametrize(
+    ("model", "match"),
+    [
+        ("polynomial,viscous", "term polynomial cannot be told apart from viscous"),
+        ("robust,coupling", "term coupling: no motor turns with two joints"),
+        ("inertia,gas-spring", "term gas-spring needs joint"),
+        ("missing.toml", "missing.toml"),
+    ],
+)
+def test_a_model_that_cannot_be_is_one_line(
+    tauhat: Tauhat, workshop: Workshop, tmp_path: Path, model: str, match: str
+) -> None:
+    result = tauhat("identify", "two_link", workshop.log, "-o", tmp_path / "e.json", "--model", model)
+    assert result.exit_code == 1
+    assert match in result.stderr
+    assert len(result.stderr.splitlines()) == 1
 
 
 def test_identify_takes_estimator_cutoff_rows_and_model(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:

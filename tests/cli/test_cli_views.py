@@ -10,6 +10,7 @@ from cli_workshop import Tauhat, Workshop
 
 from tauhat.cli.output import without_infinities
 from tauhat.cli.views.tables import aligned
+from tauhat.estimation import load_estimate
 
 
 def test_every_view_fits_eighty_columns(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:
@@ -37,10 +38,28 @@ def test_inspect_shows_limits_formulas_and_what_no_motion_tells(tauhat: Tauhat) 
 def test_identify_shows_friction_with_units_and_the_next_command(
     tauhat: Tauhat, workshop: Workshop, tmp_path: Path
 ) -> None:
-    text = tauhat("identify", "two_link", workshop.log, "-o", tmp_path / "e.json").stdout
-    assert "[Nm s/rad]" in text
+    result = tauhat("identify", "two_link", workshop.log, "-o", tmp_path / "e.json", "--model", "plain")
+    text = result.stdout
+    assert "Friction in steady motion" in text
+    assert "Nm" in text.split("Friction in steady motion")[1]
     assert "tauhat verify" in text
-    assert "13 of 13 base parameters determined" in " ".join(text.split())
+    words = " ".join(text.split())
+    assert "Terms: inertia, rotor, viscous, coulomb, offset." in words
+    assert "13 of 13 base parameters determined" in words
+
+
+def test_friction_shown_is_that_of_the_estimate_whatever_terms_make_it(
+    tauhat: Tauhat, workshop: Workshop, tmp_path: Path
+) -> None:
+    for model in ("plain", "robust"):
+        path = tmp_path / f"{model}.json"
+        text = tauhat("identify", "two_link", workshop.log, "-o", path, "--model", model).stdout
+        table = text.split("Friction in steady motion")[1]
+        row = next(line for line in table.splitlines() if "joint_1" in line)
+        shown = [float(cell) for cell in row.replace("│", " ").split() if cell.replace(".", "").lstrip("-").isdigit()]
+        estimate = load_estimate(path)
+        expected = [estimate.friction(part * estimate.robot.velocity_limit).torque[0] for part in (0.05, 0.5)]
+        assert shown[::2] == pytest.approx(expected, rel=0.05, abs=0.05)
 
 
 def test_identify_without_friction_shows_no_friction(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:

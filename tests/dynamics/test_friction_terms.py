@@ -82,7 +82,7 @@ V = np.array([-2.0, -0.3, -0.01, 0.0, 0.02, 0.7, 8.0])
     ids=lambda value: getattr(value, "key", ""),
 )
 def test_a_law_has_the_columns_of_its_formula(term: Term, expected: list[np.ndarray]) -> None:
-    assert np.allclose(at_speeds(term, V), np.array(expected, dtype=float), rtol=1e-12, atol=0)
+    assert np.allclose(at_speeds(term, V), np.array(expected, dtype=float), rtol=1e-12, atol=1e-100)
 
 
 SHAPED = (Coulomb(widths=(0.01,)), Stribeck(speeds=(0.05,)), PolynomialFriction(speeds=(0.05,)))
@@ -117,6 +117,13 @@ def test_every_law_is_finite_at_extreme_speeds_and_at_rest() -> None:
     for term in (*ODD, ViscousAsymmetry(), Asymmetric(), Asymmetric(widths=(1e-6,))):
         assert np.isfinite(at_speeds(term, extreme)).all()
         assert (at_speeds(term, [0.0]) == 0.0).all()
+
+
+def test_a_motion_that_never_is_slow_sees_no_bump_but_no_zero_column_either() -> None:
+    for term, row in ((Stribeck(speeds=(0.01,)), 0), (PolynomialFriction(speeds=(0.001,)), 4)):
+        column = at_speeds(term, [2.0, 3.0])[row]
+        assert (column > 0.0).all()
+        assert column.max() < 1e-100
 
 
 def test_dahl_states_are_those_of_the_differential_equation() -> None:

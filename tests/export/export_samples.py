@@ -10,7 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from tauhat.arrays import FloatArray
+from tauhat.dynamics import TorqueModel, base_parameters
+from tauhat.estimation import Estimate
 from tauhat.export import FrictionLaw, StandardParameters
+from tauhat.recordings.processing import Processing
 from tauhat.robots import Robot
 from tauhat.simulation import perturbed
 
@@ -67,6 +70,9 @@ URDF = """<?xml version='1.0' encoding="utf-8"?>
 </robot>
 """
 
+_SOLID = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+SOLID_URDF = URDF.replace('<link name="fore" />', f'<link name="fore">{_SOLID}</link>')
+
 
 def some_parameters(robot: Robot, *, seed: int = 0) -> StandardParameters:
     """Return physical parameters that are not the nominal ones, all different."""
@@ -82,6 +88,33 @@ def some_parameters(robot: Robot, *, seed: int = 0) -> StandardParameters:
                 shape=rng.uniform(0.01, 0.1, robot.n_v),
             ),
         ),
+    )
+
+
+def every_value(model: TorqueModel, rng: np.random.Generator) -> FloatArray:
+    """Return standard parameters of a model: links that are bodies, all else between a half and two."""
+    links = [index for index, term in enumerate(model.terms) for _ in term.parameters(model.robot) if not index]
+    rest = rng.uniform(0.5, 2.0, model.n_p - len(links))
+    return np.concatenate([perturbed(model.robot, rng, spread=0.2).inertia.ravel(), rest])
+
+
+def estimate_of(model: TorqueModel, standard: FloatArray, *, deviation: float = 0.01) -> Estimate:
+    """Return an estimate with these parameters and equal standard errors."""
+    base = base_parameters(model)
+    return Estimate(
+        model=model,
+        base=base,
+        values=base.projection @ standard,
+        covariance=deviation**2 * np.eye(base.n_b),
+        degrees=1000,
+        processing=Processing(cutoff=10.0, motion_cutoff=30.0),
+        estimator={"name": "wls"},
+        joint_rms=np.ones(model.robot.n_v),
+        torque_rms=np.ones(model.robot.n_v),
+        rank=base.n_b,
+        condition=1.0,
+        inputs=(),
+        standard=standard,
     )
 
 

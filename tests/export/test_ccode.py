@@ -4,77 +4,22 @@ from __future__ import annotations
 
 import ctypes
 import re
-import shutil
 import subprocess
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from c_library import COMPILER, STRICT, built, close, code_of, needs_compiler
 from export_samples import some_parameters, states
 
 from sample_arms import random_tree
-from tauhat.arrays import FloatArray
-from tauhat.dynamics import TERMS, Motion, TorqueModel, bias_torque, gravity_torque, inverse_dynamics, mass_matrix
-from tauhat.errors import ExportError
+from tauhat.dynamics import bias_torque, gravity_torque, inverse_dynamics, mass_matrix
+from tauhat.errors import ArrayError, ExportError
 from tauhat.export import FrictionLaw, StandardParameters, c_prefix, ccode, plain_parameters
-from tauhat.export.friction import LAWS
-from tauhat.robots import Robot, load_robot, pinocchio_model
+from tauhat.robots import load_robot, pinocchio_model
 
-COMPILER = shutil.which("gcc") or shutil.which("cc")
-STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror")
-INPUTS = {
-    "inverse_dynamics": 3, "bias": 2, "gravity": 1, "mass_matrix": 1, "friction": 1, "torque": 3,
-}  # fmt: skip
-
-pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler (gcc or cc) on this machine")
-
-
-def built(folder: Path, robot: Robot, parameters: StandardParameters) -> Callable[..., FloatArray]:
-    """Return a function that calls the compiled header by name on rows of inputs."""
-    n_v, prefix = robot.n_v, c_prefix(robot.name)
-    ccode(robot, parameters).save(folder / f"{prefix}.h")
-    lines = [f'#include "{prefix}.h"']
-    for name, count in INPUTS.items():
-        given = ", ".join(f"const double *x{k}" for k in range(count))
-        out = f"(double (*)[{n_v}])out" if name == "mass_matrix" else "out"
-        passed = ", ".join(f"x{k}" for k in range(count))
-        lines.append(f"void call_{name}({given}, double *out) {{ {prefix}_{name}({passed}, {out}); }}")
-    (folder / "calls.c").write_text("\n".join(lines) + "\n")
-    library = folder / f"{prefix}.so"
-    words = [
-        COMPILER,
-        *STRICT,
-        "-Wno-missing-prototypes",
-        "-O1",
-        "-shared",
-        "-fPIC",
-        "calls.c",
-        "-o",
-        str(library),
-        "-lm",
-    ]
-    subprocess.run(words, check=True, cwd=folder)
-    loaded = ctypes.CDLL(str(library))
-
-    def call(name: str, *inputs: FloatArray) -> FloatArray:
-        shape = (len(inputs[0]), n_v, n_v) if name == "mass_matrix" else (len(inputs[0]), n_v)
-        out = np.full(shape, np.nan)
-        for row, target in enumerate(out):
-            pointers = [ctypes.c_void_p(np.ascontiguousarray(part[row]).ctypes.data) for part in inputs]
-            getattr(loaded, f"call_{name}")(*pointers, ctypes.c_void_p(target.ctypes.data))
-        return out
-
-    return call
-
-
-def close(found: FloatArray, expected: FloatArray) -> None:
-    """Compare to 1e-12 of each joint's largest value; of all joints' where a joint carries nothing but rounding."""
-    scale, largest = np.abs(expected).max(axis=0), np.abs(expected).max()
-    assert np.isfinite(found).all()
-    assert (np.abs(found - expected) <= 1e-12 * np.where(scale > 1e-12 * largest, scale, largest)).all()
+pytestmark = needs_compiler
 
 
 @pytest.mark.parametrize("robot", [load_robot("ur5e"), random_tree(np.random.default_rng(4), 7)], ids=lambda r: r.name)
@@ -88,7 +33,7 @@ def test_every_function_is_pythons_to_rounding(tmp_path, robot):
     close(call("inverse_dynamics", q, dq, ddq), with_rotors)
     close(call("bias", q, dq), bias_torque(robot, q, dq, **inertia))
     close(call("gravity", q), gravity_torque(robot, q, **inertia))
-    close(call("friction", dq), friction)
+    close(call("friction", q, dq, ddq), friction)
     close(call("torque", q, dq, ddq), with_rotors + friction)
     close(call("mass_matrix", q), mass_matrix(robot, q, **inertia) + np.diag(parameters.rotor))
 
@@ -102,35 +47,12 @@ def test_the_mass_matrix_is_pinocchios(tmp_path):
     close(built(tmp_path, robot, plain_parameters(robot.inertia))("mass_matrix", q), expected)
 
 
-def test_every_law_of_friction_is_its_terms_own(tmp_path):
-    robot, rng = load_robot("two_link"), np.random.default_rng(2)
-    dq = np.vstack([rng.normal(size=(40, 2)) * 0.3, np.zeros((1, 2))])
-    motion = Motion(q=np.zeros_like(dq.T), dq=dq.T.copy(), ddq=np.zeros_like(dq.T))
-    for key, form in LAWS.items():
-        shape = rng.uniform(0.05, 0.2, 2) if form.shape_field else np.zeros(0)
-        term = TERMS[key](**({form.shape_field: tuple(shape)} if form.shape_field else {}))
-        model = TorqueModel(robot=robot, terms=(term,))
-        columns, _ = model.columns(motion, layout := model.layout())
-        coefficients = rng.normal(size=(len(form.symbols), 2))
-        symbols = {(parameter.symbol, parameter.joint): k for k, parameter in enumerate(model.parameters)}
-        weights = np.zeros(len(symbols))
-        for (symbol, joint), index in symbols.items():
-            weights[index] = coefficients[form.symbols.index(symbol), joint]
-        rows = [layout.of_joint(joint) for joint in range(2)]
-        expected = np.array([weights[layout.parameters][part] @ columns[part] for part in rows]).T
-        law = FrictionLaw(key=key, coefficients=coefficients, shape=shape)
-        folder = tmp_path / key
-        folder.mkdir()
-        close(
-            built(folder, robot, StandardParameters(inertia=robot.inertia, friction=(law,)))("friction", dq), expected
-        )
-
-
 def test_the_plain_sign_is_zero_at_rest(tmp_path):
     robot = load_robot("two_link")
     parameters = plain_parameters(robot.inertia, coulomb=np.array([1.0, 2.5]))
     dq = np.array([[0.3, -1e-9], [0.0, 0.0], [-2.0, 5.0]])
-    np.testing.assert_array_equal(built(tmp_path, robot, parameters)("friction", dq), np.sign(dq) * (1.0, 2.5))
+    found = built(tmp_path, robot, parameters)("friction", dq, dq, dq)
+    np.testing.assert_array_equal(found, np.sign(dq) * (1.0, 2.5))
 
 
 def test_results_may_be_written_over_arguments(tmp_path):
@@ -149,7 +71,7 @@ def test_the_header_needs_nothing_but_mathh_and_may_be_included_twice(tmp_path):
     robot = load_robot("two_link")
     header = ccode(robot, some_parameters(robot)).text
     assert re.findall(r"#include .*", header) == ["#include <math.h>"]
-    assert not re.search(r"\b(for|while|malloc|static const|goto)\b", re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL))
+    assert not re.search(r"\b(for|while|malloc|static const|goto)\b", code_of(header))
     (tmp_path / "arm.h").write_text(header)
     (tmp_path / "twice.c").write_text('#include "arm.h"\n#include "arm.h"\nint main(void) { return 0; }\n')
     subprocess.run([COMPILER, *STRICT, "twice.c", "-o", "twice", "-lm"], check=True, cwd=tmp_path)
@@ -195,11 +117,13 @@ def test_bad_prefixes_and_unphysical_links_are_refused():
 
 def test_laws_of_friction_are_checked():
     with pytest.raises(ExportError, match="unknown law of friction"):
-        FrictionLaw(key="dahl", coefficients=np.ones((1, 2)))
+        FrictionLaw(key="glue", coefficients=np.ones((1, 2)))
     with pytest.raises(ExportError, match="friction coulomb: the shape must be one positive value a joint"):
         FrictionLaw(key="coulomb", coefficients=np.ones((1, 2)), shape=np.array([0.1, -0.1]))
     with pytest.raises(ExportError, match="friction stribeck: the law has no shape yet"):
         FrictionLaw(key="stribeck", coefficients=np.ones((1, 2)))
+    with pytest.raises(ArrayError, match="load has the wrong shape"):
+        FrictionLaw(key="load-dahl", coefficients=np.ones((1, 2)))
     law = FrictionLaw(key="viscous", coefficients=np.ones((1, 3)))
     with pytest.raises(ExportError, match="friction viscous of another robot; expected 2 joints, got 3"):
         StandardParameters(inertia=load_robot("two_link").inertia, friction=(law,))

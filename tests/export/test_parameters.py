@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from types import SimpleNamespace
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from export_samples import estimate_of
 
 from sample_arms import planar_truth
-from tauhat.dynamics import TERMS, TorqueModel, inverse_dynamics
+from tauhat.dynamics import TERMS, Offset, TorqueModel, inverse_dynamics
+from tauhat.dynamics.terms import CouplingDahl, GasSpring, LoadDahl
+from tauhat.dynamics.terms.presliding import LENGTHS
 from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
 from tauhat.errors import ArrayError, ExportError
 from tauhat.estimation import identify
-from tauhat.export import StandardParameters, check_parameters, plain_parameters, standard_parameters
+from tauhat.export import (
+    CoupledMotors,
+    StandardParameters,
+    check_parameters,
+    model_parameters,
+    plain_parameters,
+    standard_parameters,
+)
 from tauhat.export.parameters import body_defect
 from tauhat.recordings.processing import Processing
-
-
-def estimate_of(model: TorqueModel, standard: object) -> SimpleNamespace:
-    """Return what an estimate with full parameters shows of itself."""
-    return SimpleNamespace(model=model, robot=model.robot, standard=standard)
+from tauhat.robots.shared_motor import SharedMotor
 
 
 def truth_with(*keys: str) -> TorqueModel:
@@ -36,8 +42,10 @@ def test_parameters_are_sorted_into_links_rotors_and_laws():
     assert [law.key for law in found.friction] == ["viscous", "coulomb", "offset"]
     np.testing.assert_array_equal(found.law("coulomb").coefficients, [[1.4, 0.7]])
     np.testing.assert_array_equal(found.law("coulomb").shape, truth.model.terms[3].widths)
-    assert found.of_joint("offset", 1) == -0.2
-    assert found.of_joint("cube-root", 1) is None
+    assert found.law("offset").coefficients[0, 1] == -0.2
+    assert found.law("cube-root") is None
+    assert not found.springs.any()
+    assert (found.gas_spring, found.motors, found.with_memory, found.left_out) == (None, None, (), ())
 
 
 def test_the_parts_make_the_torque_of_the_model():
@@ -58,27 +66,64 @@ def test_an_estimate_of_base_parameters_is_refused_with_the_remedy():
         standard_parameters(estimate)
 
 
-def test_a_term_with_a_memory_is_refused_by_name_and_can_be_left_out():
-    model = truth_with("inertia", "viscous", "dahl")
-    estimate = estimate_of(model, np.arange(1.0, model.n_p + 1.0))
-    with pytest.raises(ExportError, match=r"term dahl is more than a function of a joint's speed.*`--without dahl`"):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wind(Offset):
+    """A term that no other program knows."""
+
+    key: ClassVar[str] = "wind"
+
+
+def test_a_term_that_no_program_knows_is_refused_by_name_and_can_be_left_out():
+    model = TorqueModel(robot=planar_truth().model.robot, terms=(TERMS["inertia"](), TERMS["viscous"](), Wind()))
+    estimate = estimate_of(model, np.concatenate([model.robot.inertia.ravel(), np.ones(4)]))
+    with pytest.raises(ExportError, match=r"term wind cannot be told to another program.*`--without wind`"):
         standard_parameters(estimate)
-    found = standard_parameters(estimate, without=["dahl"])
-    assert found.left_out == ("dahl",)
+    found = standard_parameters(estimate, without=["wind"])
+    assert found.left_out == ("wind",)
     assert [law.key for law in found.friction] == ["viscous"]
+
+
+def test_springs_motors_and_laws_of_the_load_are_sorted_with_all_they_need():
+    robot, motors = planar_truth().model.robot, (SharedMotor(1, 0, 0.5),)
+    loaded = tuple(np.arange(20.0))
+    gas = GasSpring(joint=0, distance=0.5, lever=0.2, angle=0.3, area=2e-3, volume=3e-3)
+    terms = (TERMS["inertia"](), TERMS["spring"](), gas, CouplingDahl(motors=motors), LoadDahl(inertia=loaded))
+    model = TorqueModel(robot=robot, terms=terms)
+    found = model_parameters(model, np.concatenate([robot.inertia.ravel(), np.arange(1.0, 10.0)]))
+    np.testing.assert_array_equal(found.springs, [1.0, 2.0])
+    assert (found.gas_spring.spring, found.gas_spring.energy) == (gas, 3.0)
+    assert found.motors.motors == motors
+    np.testing.assert_array_equal([*found.motors.inertia, *found.motors.viscous, *found.motors.dry[0]], [4, 5, 6, 7])
+    np.testing.assert_array_equal(found.law("load-dahl").coefficients, [[8.0, 9.0]])
+    np.testing.assert_array_equal(found.law("load-dahl").load.ravel(), loaded)
+    assert found.with_memory == ("load-dahl", "coupling-dahl")
+    assert found.law("load-dahl").lengths(1) == LENGTHS[:1]
+    less = model_parameters(model, np.ones(model.n_p), without=["spring", "gas-spring", "coupling-dahl"])
+    assert (less.gas_spring, less.motors, less.left_out) == (None, None, ("spring", "gas-spring", "coupling-dahl"))
+    assert not less.springs.any()
+
+
+def test_motors_without_widths_or_with_strange_friction_are_refused():
+    given = {"motors": (SharedMotor(1, 0, 0.5),), "inertia": np.ones(1), "viscous": np.ones(1)}
+    with pytest.raises(ExportError, match="one width a motor is needed"):
+        CoupledMotors(**given, dry=np.ones((1, 1)), widths=(0.1, 0.2))
+    with pytest.raises(ExportError, match="one sign or two Dahl states"):
+        CoupledMotors(**given, dry=np.ones((1, 3)))
+    with pytest.raises(ArrayError, match="inertia has the wrong shape"):
+        CoupledMotors(**{**given, "inertia": np.ones(2)}, dry=np.ones((1, 1)))
 
 
 def test_a_law_on_some_joints_is_zero_on_the_others():
     model = TorqueModel(
         robot=planar_truth().model.robot, terms=(TERMS["inertia"](), TERMS["cube-root"](joints=(False, True)))
     )
-    found = standard_parameters(estimate_of(model, np.arange(21.0)))
+    found = model_parameters(model, np.arange(21.0))
     np.testing.assert_array_equal(found.law("cube-root").coefficients, [[0.0, 20.0]])
 
 
 def test_links_without_products_of_inertia_have_zeros_there():
     model = TorqueModel(robot=planar_truth().model.robot, terms=(InertiaWithoutProducts(),))
-    found = standard_parameters(estimate_of(model, np.arange(1.0, 15.0)))
+    found = model_parameters(model, np.arange(1.0, 15.0))
     np.testing.assert_array_equal(found.inertia[1], [8, 9, 10, 11, 12, 0, 13, 0, 0, 14])
 
 
@@ -91,8 +136,6 @@ def test_what_cannot_be_left_out_or_is_missing_is_said():
     friction = truth_with("viscous")
     with pytest.raises(ExportError, match="the model has no inertia to export"):
         standard_parameters(estimate_of(friction, np.ones(2)))
-    with pytest.raises(ArrayError, match="standard has the wrong shape"):
-        standard_parameters(estimate_of(truth.model, np.ones(3)))
 
 
 def test_point_masses_rods_and_plates_are_bodies_and_less_is_not():
@@ -117,5 +160,5 @@ def test_parameters_are_copied_read_only_and_checked():
     with pytest.raises(ArrayError, match="rotor has the wrong shape"):
         StandardParameters(inertia=robot.inertia, rotor=np.ones(3))
     check_parameters(robot, made)
-    with pytest.raises(ExportError, match="joint j2: the rotor inertia is negative"):
-        check_parameters(robot, replace(made, rotor=np.array([0.1, -0.1])))
+    with pytest.raises(ExportError, match="planar: parameters of another robot"):
+        check_parameters(robot, replace(made, inertia=np.ones((3, 10)), rotor=np.ones(3), springs=(), friction=()))

@@ -15,6 +15,7 @@ from tauhat.cli.adapter import as_command
 from tauhat.cli.commands import (
     calibrate_drives,
     check,
+    compare,
     demo,
     excite,
     export,
@@ -48,6 +49,7 @@ app.command("identify")(as_command(identify.run, identify.Options))
 app.command("verify")(as_command(verify.run, verify.Options))
 app.command("payload")(as_command(payload.run, payload.Options))
 app.command("calibrate-drives")(as_command(calibrate_drives.run, calibrate_drives.Options))
+app.command("compare")(as_command(compare.run, compare.Options))
 app.command("report")(as_command(report.run, report.Options))
 app.command("export")(as_command(export.run, export.Options))
 app.command("view")(as_command(view.run, view.Options))

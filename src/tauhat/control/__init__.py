@@ -1,5 +1,5 @@
 """Control laws as pure steps, without plant or clock."""
 
-from tauhat.control.laws import PDGravity
+from tauhat.control.laws import PD, PID, PDFeedforward, PDGravity, TrackingLaw
 
-__all__ = ["PDGravity"]
+__all__ = ["PD", "PID", "PDFeedforward", "PDGravity", "TrackingLaw"]

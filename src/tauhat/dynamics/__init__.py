@@ -3,7 +3,8 @@
 from tauhat.dynamics.barycentric import BarycentricParameters, barycentric_parameters
 from tauhat.dynamics.base import BaseParameters, base_parameters, random_motion
 from tauhat.dynamics.closed_form_base import closed_form_base
-from tauhat.dynamics.model import PLAIN_TERMS, TERMS, TorqueModel, torque_model
+from tauhat.dynamics.model import PLAIN_TERMS, ROBUST_TERMS, TERMS, TorqueModel, torque_model
+from tauhat.dynamics.model_file import load_model
 from tauhat.dynamics.motion import Motion, motion_from_rows
 from tauhat.dynamics.rigid_body import bias_torque, gravity_torque, inverse_dynamics, mass_matrix, regressor
 from tauhat.dynamics.small_terms import without_small_terms
@@ -12,6 +13,7 @@ from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
 
 __all__ = [
     "PLAIN_TERMS",
+    "ROBUST_TERMS",
     "TERMS",
     "BarycentricParameters",
     "BaseParameters",
@@ -31,6 +33,7 @@ __all__ = [
     "closed_form_base",
     "gravity_torque",
     "inverse_dynamics",
+    "load_model",
     "mass_matrix",
     "motion_from_rows",
     "random_motion",

@@ -171,7 +171,7 @@ def _preference(model: TorqueModel, index: int) -> tuple[int, int, int]:
 
 
 def _visible(model: TorqueModel, norms: FloatArray) -> NDArray[np.bool_]:
-    """Return which columns are not zero, (n_p,); what rigid bodies make may be a rounded angle, and then counts as zero."""
+    """Return which columns are not zero, (n_p,); what comes from rigid bodies may be a rounded angle: nothing, too."""
     units = np.array([parameter.unit for parameter in model.parameters])
     bodies = _of_bodies(model)
     return np.array(

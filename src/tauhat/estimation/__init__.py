@@ -3,15 +3,10 @@
 from tauhat.estimation.drives import DriveCalibration, DriveGains, WeighedPayload, calibrate_drives
 from tauhat.estimation.essential import EssentialLeastSquares, EssentialParameters, EssentialStep, essential_parameters
 from tauhat.estimation.estimate import Estimate, InputLog, ParameterRow, load_estimate
+from tauhat.estimation.estimators import ESTIMATORS, estimator_named
 from tauhat.estimation.evidence import Evidence, collect, collect_all
 from tauhat.estimation.identify import identify
-from tauhat.estimation.least_squares import (
-    ESTIMATORS,
-    Estimator,
-    OrdinaryLeastSquares,
-    WeightedLeastSquares,
-    estimator_named,
-)
+from tauhat.estimation.least_squares import Estimator, OrdinaryLeastSquares, WeightedLeastSquares
 from tauhat.estimation.payload import KnownPayload, Payload, identify_payload
 from tauhat.estimation.payload_body import Body
 from tauhat.estimation.physical import ConsistentSolution, consistent
@@ -24,6 +19,7 @@ from tauhat.estimation.physical_constraints import (
     PhysicalConstraints,
 )
 from tauhat.estimation.solution import Solution
+from tauhat.estimation.structure import Structure, Trial, select_model
 
 __all__ = [
     "ESTIMATORS",
@@ -49,6 +45,8 @@ __all__ = [
     "Payload",
     "PhysicalConstraints",
     "Solution",
+    "Structure",
+    "Trial",
     "WeighedPayload",
     "WeightedLeastSquares",
     "calibrate_drives",
@@ -60,4 +58,5 @@ __all__ = [
     "identify",
     "identify_payload",
     "load_estimate",
+    "select_model",
 ]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
 from tauhat.blas import single_threaded
-from tauhat.dynamics.base import BaseParameters, base_parameters
+from tauhat.dynamics.base import base_parameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.errors import TauhatWarning
 from tauhat.estimation.estimate import Estimate, input_log
@@ -20,7 +20,7 @@ from tauhat.estimation.physical import consistent
 from tauhat.estimation.physical_constraints import PhysicalConstraints
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.rows import check_recordings
-from tauhat.estimation.solution import Solution
+from tauhat.estimation.solution import Solution, joint_residuals
 from tauhat.estimation.tuning import tuned
 from tauhat.recordings.choice import top_speeds
 from tauhat.recordings.processing import Processing, moving_joints
@@ -69,33 +69,27 @@ def identify(
     settled = iterated(settled, recordings, settings, method)
     base = base_parameters(settled)
     evidence = collect_all(settled, base, recordings, settings)
-    problem = Problem(model=settled, base=base, recordings=tuple(recordings), processing=settings, evidence=evidence)
+    problem = method.settled(
+        Problem(model=settled, base=base, recordings=tuple(recordings), processing=settings, evidence=evidence)
+    )
     solution = method.fit_problem(problem)
     _warn_of_still_joints(recordings)
-    estimate = _estimate(settled, base, solution, settings=settings, method=method, recordings=recordings)
+    estimate = _estimate(problem, solution, method)
     if constraints is not None:
-        estimate = _made_physical(estimate, evidence, solution, constraints)
-    warn_of_weak_motion(evidence, solution, estimate)
+        estimate = _made_physical(estimate, problem.evidence, solution, constraints)
+    warn_of_weak_motion(problem.evidence, solution, estimate)
     _warn_of_negative_friction(estimate, recordings)
     return estimate
 
 
-def _estimate(
-    model: TorqueModel,
-    base: BaseParameters,
-    solution: Solution,
-    *,
-    settings: Processing,
-    method: Estimator,
-    recordings: Sequence[Recording],
-) -> Estimate:
+def _estimate(problem: Problem, solution: Solution, method: Estimator) -> Estimate:
     kept = {field.name for field in fields(Solution)} & {field.name for field in fields(Estimate)}
     return Estimate(
-        model=model,
-        base=base,
-        processing=settings,
-        estimator={"name": method.key, **asdict(method)},
-        inputs=tuple(input_log(recording) for recording in recordings),
+        model=problem.model,
+        base=problem.base,
+        processing=problem.processing,
+        estimator={"name": method.key, **method.settings()},
+        inputs=tuple(input_log(recording) for recording in problem.recordings),
         **{name: getattr(solution, name) for name in kept},
     )
 
@@ -114,10 +108,11 @@ def _made_physical(
         when that is so.
     """
     model, base, weights = estimate.model, estimate.base, solution.weights
-    found, kept = consistent(evidence, model, base, weights=weights, constraints=constraints), constraints
+    solved = solution.evidence or evidence
+    found, kept = consistent(solved, model, base, weights=weights, constraints=constraints), constraints
     if found.cost > _DEAR and _ROTOR not in constraints.unbounded:
         freed = replace(constraints, unbounded=(*constraints.unbounded, _ROTOR))
-        freer = consistent(evidence, model, base, weights=weights, constraints=freed)
+        freer = consistent(solved, model, base, weights=weights, constraints=freed)
         if freer.cost < 0.5 * found.cost:
             warnings.warn(
                 f"rotor inertias of at least zero cost {100 * found.cost:.0f} % of the residual, without that bound "
@@ -130,7 +125,7 @@ def _made_physical(
     return replace(
         estimate,
         values=found.values,
-        joint_rms=found.joint_rms,
+        joint_rms=joint_residuals(evidence, found.values),
         standard=found.standard,
         physical=found.report(kept),
     )

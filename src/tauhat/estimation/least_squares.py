@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,9 @@ from tauhat.estimation.solution import (
     honest_covariance,
     joint_residuals,
     joint_torques,
+    number_of_groups,
     rank_and_condition,
     solve,
-    time_groups,
 )
 
 
@@ -49,6 +49,14 @@ class Estimator(ABC):
     def solve(self, evidence: Evidence) -> Solved:
         """Return values alone, the quick part of `fit`."""
 
+    def settings(self) -> dict[str, Any]:
+        """Return the settings as plain data, for the estimate file."""
+        return asdict(self)
+
+    def settled(self, problem: Problem) -> Problem:
+        """Return the problem with what this method chooses itself, such as shapes of terms; by default as it is."""
+        return problem
+
     def fit_problem(self, problem: Problem) -> Solution:
         """Return the solution of a whole problem; methods that need more than its evidence read its recordings."""
         return self.fit(problem.evidence)
@@ -61,15 +69,9 @@ class Estimator(ABC):
         ModelError
             when there are no more rows than parameters: neither values nor error bars would mean anything.
         """
-        rows = evidence.n_v * evidence.n_t
-        if rows <= evidence.n_b:
-            raise ModelError(
-                f"{rows} filtered rows cannot determine {evidence.n_b} base parameters",
-                remedy="give a longer recording, or a higher cut-off",
-            )
+        check_rows(evidence)
         solved = self.solve(evidence)
         rank, condition = rank_and_condition(evidence, solved.weights)
-        groups = len(time_groups(evidence))
         return Solution(
             values=solved.values,
             covariance=honest_covariance(evidence, solved.weights, solved.values, ridge=self.ridge),
@@ -78,9 +80,25 @@ class Estimator(ABC):
             torque_rms=joint_torques(evidence),
             rank=rank,
             condition=condition,
-            degrees=groups - 1 if groups > 1 else rows - evidence.n_b,
+            degrees=degrees_of_freedom(evidence),
             passes=solved.passes,
         )
+
+
+def check_rows(evidence: Evidence) -> None:
+    """Refuse evidence of no more rows than parameters."""
+    rows = evidence.n_v * evidence.n_t
+    if rows <= evidence.n_b:
+        raise ModelError(
+            f"{rows} filtered rows cannot determine {evidence.n_b} base parameters",
+            remedy="give a longer recording, or a higher cut-off",
+        )
+
+
+def degrees_of_freedom(evidence: Evidence) -> int:
+    """Return the degrees of freedom of the standard errors: groups of time less one; rows where there is one group."""
+    groups = number_of_groups(evidence)
+    return groups - 1 if groups > 1 else evidence.n_v * evidence.n_t - evidence.n_b
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,19 +151,3 @@ class WeightedLeastSquares(Estimator):
         residual, torque = joint_residuals(evidence, values), joint_torques(evidence)
         floor = max(1e-6 * torque.max(), np.finfo(float).tiny)
         return np.asarray(np.maximum(residual, floor) ** -self.power)
-
-
-ESTIMATORS: dict[str, type[Estimator]] = {method.key: method for method in (OrdinaryLeastSquares, WeightedLeastSquares)}
-
-
-def estimator_named(key: str) -> Estimator:
-    """Return the estimator of this name in its default settings.
-
-    Raises
-    ------
-    ModelError
-        when there is none.
-    """
-    if key not in ESTIMATORS:
-        raise ModelError("unknown estimator", expected=", ".join(ESTIMATORS), got=key)
-    return ESTIMATORS[key]()

@@ -22,6 +22,7 @@ class Problem:
     recordings : as measured
     processing : filters of torque and columns
     evidence : of all recordings, through these filters
+    kept : filtered rows of each recording, where several methods share them; empty: made when asked for
     """
 
     model: TorqueModel
@@ -29,6 +30,7 @@ class Problem:
     recordings: tuple[Recording, ...]
     processing: Processing
     evidence: Evidence
+    kept: tuple[Rows, ...] = ()
 
     def rows(self) -> Iterator[Rows]:
         """Yield the filtered rows of every recording again, for methods that need each sample."""

@@ -11,8 +11,9 @@ separate", 1973.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from tauhat.recordings.recording import Recording
 
 FINER = (0.6, 0.8, 1.0, 1.25, 1.6)  # of the best shape on the grid: the second look
 LEAST_GAIN = 0.002  # of the residual of all joints, for one joint to take another form than most
+Gather: TypeAlias = Callable[[TorqueModel, BaseParameters], Evidence]
 _SWEEPS = 2
 _RIDGE = 1e-7  # on columns of unit norm: a form that the motion never shows must not spoil the factor
 
@@ -37,30 +39,28 @@ def chosen_form(
     forms: Sequence[Term],
     recordings: Sequence[Recording],
     processing: Processing,
+    *,
+    gather: Gather | None = None,
 ) -> Term:
     """Return the mixture of `forms` of one of the model's terms that leaves the least residual.
 
     Parameters
     ----------
     base : of the model with the term in any of its forms
+    gather : makes the evidence; of all rows alike by default
 
     A shape that is one number a joint is then looked at more closely around the best of its forms.
     """
-    best = _mixture(model, base, forms, recordings, processing)
+    take = gather or (lambda wide, kept: collect_all(wide, kept, recordings, processing, most_blocks=1))
+    best = _mixture(model, base, forms, take)
     if not isinstance(best, ShapedTerm):
         return best
     closer = [best.with_shape([factor * value for value in best.shape]) for factor in FINER]
-    return _mixture(model, base, closer, recordings, processing)
+    return _mixture(model, base, closer, take)
 
 
-def _mixture(
-    model: TorqueModel,
-    base: BaseParameters,
-    forms: Sequence[Term],
-    recordings: Sequence[Recording],
-    processing: Processing,
-) -> Term:
-    choice = _choice(model, base, forms, recordings, processing)
+def _mixture(model: TorqueModel, base: BaseParameters, forms: Sequence[Term], gather: Gather) -> Term:
+    choice = _choice(model, base, forms, gather)
     alike = [choice.residual([form] * model.robot.n_v) for form in range(len(forms))]
     picks, level = [int(np.argmin(alike))] * model.robot.n_v, min(alike)
     for _ in range(_SWEEPS):
@@ -99,13 +99,7 @@ class _Choice:
         return abs(float(reduced[count, count]))
 
 
-def _choice(
-    model: TorqueModel,
-    base: BaseParameters,
-    forms: Sequence[Term],
-    recordings: Sequence[Recording],
-    processing: Processing,
-) -> _Choice:
+def _choice(model: TorqueModel, base: BaseParameters, forms: Sequence[Term], gather: Gather) -> _Choice:
     key = forms[0].key
     place = next(index for index, term in enumerate(model.terms) if term.key == key)
     bank = Bank(forms=tuple(forms))
@@ -117,7 +111,7 @@ def _choice(
     moved = np.where(others < start, others, others + more)
     kept = np.sort(np.concatenate([moved, np.arange(start, start + size + more)]))
     wide = _kept_set(banked, kept)
-    evidence = collect_all(banked, wide, recordings, processing, most_blocks=1)
+    evidence = gather(banked, wide)
     supports = forms[0].support(model.robot)
     owned = tuple(
         tuple(np.searchsorted(kept, start + form * size + support) for form in range(len(forms)))

@@ -44,6 +44,7 @@ class Solution:
     passes : how often the problem was solved
     cause : why the method stopped, in words
     advice : what to do about it where something is wrong
+    evidence : that was solved, where the method weighted its rows; None where it is the one that was given
     """
 
     values: FloatArray
@@ -57,6 +58,7 @@ class Solution:
     passes: int
     cause: str = "solved"
     advice: str = ""
+    evidence: Evidence | None = None
 
     def __post_init__(self) -> None:
         for array in (self.values, self.covariance, self.weights, self.joint_rms, self.torque_rms):
@@ -106,7 +108,7 @@ def _triangle(evidence: Evidence, weights: FloatArray) -> tuple[FloatArray, Floa
 
     Columns of mere rounding are zero there and their norm infinite: their parameters come out as zero, without rank.
     """
-    matrix, rhs = _stacked(evidence, evidence.total, weights)
+    matrix, rhs = stacked(evidence, evidence.total, weights)
     if not rhs.any():
         raise ModelError("the torque is zero throughout", remedy="name the right torque columns in the map")
     scale = np.linalg.norm(matrix, axis=0)
@@ -121,7 +123,8 @@ def _triangle(evidence: Evidence, weights: FloatArray) -> tuple[FloatArray, Floa
     return triangle[: evidence.n_b], np.asarray(scale)
 
 
-def _stacked(evidence: Evidence, block: Block, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+def stacked(evidence: Evidence, block: Block, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return one block's weighted factors of all joints as rows over all parameters, and their right-hand sides."""
     parts, rights = [], []
     for joint, factor in enumerate(block.factors):
         rows = np.zeros((factor.shape[0], evidence.n_b))
@@ -149,7 +152,7 @@ def joint_torques(evidence: Evidence) -> FloatArray:
 
 def honest_covariance(evidence: Evidence, weights: FloatArray, values: FloatArray, *, ridge: float) -> FloatArray:
     """Return the covariance of the parameters, (n_b, n_b); see the head of this file."""
-    matrix, rhs = _stacked(evidence, evidence.total, weights)
+    matrix, rhs = stacked(evidence, evidence.total, weights)
     scale = np.linalg.norm(matrix, axis=0)
     _, singular, right = np.linalg.svd(np.linalg.qr(matrix / scale, mode="r"), full_matrices=False)
     damped = np.sqrt(singular**2 + ridge**2)
@@ -158,12 +161,22 @@ def honest_covariance(evidence: Evidence, weights: FloatArray, values: FloatArra
     rows = evidence.n_v * evidence.n_t
     variance = np.sum((matrix @ values - rhs) ** 2) / max(1, rows - evidence.n_b)
     white = variance * (root @ root.T) / np.outer(scale, scale)
-    spread = np.diag(white).copy()
     groups = time_groups(evidence)
-    if len(groups) > 1:
-        moves = _block_moves(evidence, groups, weights, values, root=root / scale[:, None])
-        count = len(groups)
-        spread = np.maximum(spread, (count - 1) / count * np.sum(moves**2, axis=0))
+    if len(groups) == 1:
+        return np.asarray(white)
+    return widened(white, block_moves(evidence, groups, weights, values, root=root / scale[:, None]))
+
+
+def widened(white: FloatArray, moves: FloatArray) -> FloatArray:
+    """Return the covariance with the jackknife's variances, never less than the white ones, and white correlations.
+
+    Parameters
+    ----------
+    white : (n_b, n_b) covariance that independent residuals would give
+    moves : (n_groups, n_b) how far the solution moves when each group of time is left out
+    """
+    count = len(moves)
+    spread = np.maximum(np.diag(white), (count - 1) / count * np.sum(moves**2, axis=0))
     inflation = np.sqrt(spread / np.diag(white))
     return np.asarray(white * np.outer(inflation, inflation))
 
@@ -173,16 +186,37 @@ def time_groups(evidence: Evidence) -> tuple[Block, ...]:
     return evidence.merged_blocks(MOST_GROUPS)
 
 
-def _block_moves(
+def number_of_groups(evidence: Evidence) -> int:
+    """Return how many groups of time there are, without making them."""
+    count = len(evidence.blocks)
+    while count > MOST_GROUPS:
+        count = (count + 1) // 2
+    return count
+
+
+def block_moves(
     evidence: Evidence, groups: tuple[Block, ...], weights: FloatArray, values: FloatArray, *, root: FloatArray
 ) -> FloatArray:
-    """Return how far the solution moves when each group is left out, (n_groups, n_b)."""
+    """Return how far the solution moves when each group is left out, (n_groups, n_b).
+
+    Parameters
+    ----------
+    root : (n_b, n_b) a root of the inverse of what the squared error bends by: `root root' = (A'A)^-1`
+    """
     moves = []
     for block in groups:
-        matrix, rhs = _stacked(evidence, block, weights)
+        matrix, rhs = stacked(evidence, block, weights)
         turned = matrix @ root
-        score = turned.T @ (rhs - matrix @ values)
-        leverage, axes = np.linalg.eigh(turned.T @ turned)
-        free = np.maximum(1.0 - leverage, _LEAST_FREE)
-        moves.append(-root @ (axes @ ((axes.T @ score) / free)))
+        moves.append(-root @ freed(turned.T @ turned, turned.T @ (rhs - matrix @ values)))
     return np.array(moves)
+
+
+def freed(held: FloatArray, score: FloatArray) -> FloatArray:
+    """Return `(E - held)^-1 score`, with eigenvalues of `E - held` below 1e-3 raised to that."""
+    free = np.eye(len(held)) - held
+    try:
+        np.linalg.cholesky(free - _LEAST_FREE * np.eye(len(held)))
+    except np.linalg.LinAlgError:
+        sizes, axes = np.linalg.eigh(free)
+        return np.asarray(axes @ ((axes.T @ score) / np.maximum(sizes, _LEAST_FREE)))
+    return np.asarray(np.linalg.solve(free, score))

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tauhat.export.parameters import StandardParameters
 from tauhat.files import write_text
 
 
@@ -16,10 +15,12 @@ class ExportedText:
 
     text : the whole file
     left_out : what its format has no word for, with the largest coefficient
+    set_to_zero : what came out negative and cannot be in this format, by name, with its value
     """
 
     text: str
     left_out: Mapping[str, float] = field(default_factory=dict)
+    set_to_zero: Mapping[str, float] = field(default_factory=dict)
 
     def save(self, path: str | Path) -> None:
         """Write the file whole or not at all.
@@ -30,9 +31,3 @@ class ExportedText:
             when it cannot be written.
         """
         write_text(path, self.text)
-
-
-def untold_friction(parameters: StandardParameters) -> dict[str, float]:
-    """Return the laws that a simulator's damping and dry friction do not cover -> largest coefficient."""
-    plain = {"viscous", "coulomb"}
-    return {law.key: law.largest for law in parameters.friction if law.key not in plain and law.largest > 0.0}

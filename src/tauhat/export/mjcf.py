@@ -9,9 +9,10 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ExportError
 from tauhat.export.bodies import central_body, row
-from tauhat.export.exported import ExportedText, untold_friction
+from tauhat.export.exported import ExportedText
 from tauhat.export.links import named_links
-from tauhat.export.parameters import StandardParameters, check_parameters
+from tauhat.export.parameters import StandardParameters
+from tauhat.export.simulators import ToldParameters, told_parameters
 from tauhat.robots.joint import Joint
 from tauhat.robots.robot import Robot
 from tauhat.robots.transforms import quaternion
@@ -23,15 +24,21 @@ _TIMESTEP = 1e-3  # [s]
 def mjcf(robot: Robot, parameters: StandardParameters) -> ExportedText:
     """Return an MJCF with the robot's joint frames as bodies and its other frames as sites.
 
-    Rotor inertia becomes armature, viscous friction damping, Coulomb friction friction loss with nearly rigid contact,
-    as in the library's own plant. Position limits become ranges, torque limits the range of the actuators' force.
+    Rotor inertia becomes armature, friction damping and friction loss (`StandardParameters.plain_friction`) with nearly
+    rigid contact, as in the library's own plant. Position limits become ranges, torque limits the range of the
+    actuators' force.
 
     Raises
     ------
     ExportError
         when a link is no body or has no mass, naming it, or the parameters are of another robot.
+
+    Warns
+    -----
+    TauhatWarning
+        when something is negative and is set to zero, and when damping and dry friction are far from the model's.
     """
-    check_parameters(robot, parameters)
+    told = told_parameters(robot, parameters)
     links = named_links(robot)
     root = Element("mujoco", model=robot.name)
     SubElement(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
@@ -44,13 +51,14 @@ def mjcf(robot: Robot, parameters: StandardParameters) -> ExportedText:
     for index, joint in enumerate(robot.joints):
         place = _placed(joint.rotation, joint.translation)
         body = SubElement(bodies[joint.parent], "body", {"name": links.moving[index], **place})
-        _add_inertial(body, joint.name, parameters.inertia[index])
-        _add_joint(body, joint, index, parameters)
+        _add_inertial(body, joint.name, told.inertia[index])
+        _add_joint(body, joint, index, told)
         bodies[index] = body
     for frame in links.others:
         SubElement(bodies[frame.joint], "site", {"name": frame.name, **_placed(frame.rotation, frame.translation)})
     indent(root)
-    return ExportedText(text=tostring(root, encoding="unicode") + "\n", left_out=untold_friction(parameters))
+    text = tostring(root, encoding="unicode") + "\n"
+    return ExportedText(text=text, left_out=told.left_out, set_to_zero=told.set_to_zero)
 
 
 def _placed(rotation: FloatArray, translation: FloatArray) -> dict[str, str]:
@@ -69,15 +77,14 @@ def _add_inertial(element: Element, joint: str, inertia: FloatArray) -> None:
     SubElement(element, "inertial", {**place, "mass": row(body.mass), "diaginertia": row(*moments)})
 
 
-def _add_joint(element: Element, joint: Joint, index: int, parameters: StandardParameters) -> None:
+def _add_joint(element: Element, joint: Joint, index: int, told: ToldParameters) -> None:
     values = {
         "name": joint.name,
         "type": "hinge" if joint.kind == "revolute" else "slide",
         "axis": row(*joint.axis),
-        "armature": row(parameters.rotor[index]),
+        "armature": row(told.rotor[index]),
     }
-    for key, word in (("viscous", "damping"), ("coulomb", "frictionloss")):
-        value = parameters.of_joint(key, index)
+    for word, value in zip(("damping", "frictionloss"), told.friction.of_joint(index), strict=True):
         if value is not None:
             values[word] = row(value)
     if np.isfinite([joint.limits.lower, joint.limits.upper]).all():

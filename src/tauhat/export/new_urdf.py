@@ -1,4 +1,4 @@
-"""A new URDF for a robot that did not come from one: kinematics, limits, inertials, joint dynamics, no shapes."""
+"""A new URDF for any robot: kinematics, limits, inertials, joint dynamics, no shapes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.export.bodies import central_body, row
-from tauhat.export.exported import ExportedText, untold_friction
+from tauhat.export.exported import ExportedText
 from tauhat.export.links import named_links
-from tauhat.export.parameters import StandardParameters, check_parameters
+from tauhat.export.parameters import StandardParameters
+from tauhat.export.simulators import ToldParameters, told_parameters
 from tauhat.robots.joint import Joint
 from tauhat.robots.robot import Robot
 
@@ -26,25 +27,30 @@ def new_urdf(robot: Robot, parameters: StandardParameters) -> ExportedText:
     ------
     ExportError
         when a link is no body, naming it, or the parameters are of another robot.
+
+    Warns
+    -----
+    TauhatWarning
+        when something is negative and is set to zero, and when damping and dry friction are far from the model's.
     """
-    check_parameters(robot, parameters)
+    told = told_parameters(robot, parameters)
     links = named_links(robot)
     root = Element("robot", name=robot.name)
     SubElement(root, "link", name=links.base)
     for index, joint in enumerate(robot.joints):
-        _add_link(root, links.moving[index], parameters.inertia[index])
+        _add_link(root, links.moving[index], told.inertia[index])
         element = _add_joint(root, joint.name, _kind(joint), (links.carrier(joint.parent), links.moving[index]))
         _add_origin(element, joint.rotation, joint.translation)
         SubElement(element, "axis", xyz=row(*joint.axis))
         _add_limit(element, joint)
-        _add_dynamics(element, parameters, index)
+        _add_dynamics(element, told, index)
     for frame in links.others:
         SubElement(root, "link", name=frame.name)
         element = _add_joint(root, f"{frame.name}_fixed", "fixed", (links.carrier(frame.joint), frame.name))
         _add_origin(element, frame.rotation, frame.translation)
     indent(root)
-    text = tostring(root, encoding="unicode")
-    return ExportedText(text=f'<?xml version="1.0"?>\n{text}\n', left_out=untold_friction(parameters))
+    text = f'<?xml version="1.0"?>\n{tostring(root, encoding="unicode")}\n'
+    return ExportedText(text=text, left_out=told.left_out, set_to_zero=told.set_to_zero)
 
 
 def _add_link(root: Element, name: str, inertia: FloatArray) -> None:
@@ -84,10 +90,10 @@ def _add_limit(element: Element, joint: Joint) -> None:
     SubElement(element, "limit", {name: row(_finite(value)) for name, value in values.items()})
 
 
-def _add_dynamics(element: Element, parameters: StandardParameters, index: int) -> None:
-    told = {"damping": parameters.of_joint("viscous", index), "friction": parameters.of_joint("coulomb", index)}
-    values = {word: row(value or 0.0) for word, value in told.items()}
-    rotor = float(parameters.rotor[index])
+def _add_dynamics(element: Element, told: ToldParameters, index: int) -> None:
+    known = zip(("damping", "friction"), told.friction.of_joint(index), strict=True)
+    values = {word: row(value or 0.0) for word, value in known}
+    rotor = float(told.rotor[index])
     SubElement(element, "dynamics", values | ({"armature": row(rotor)} if rotor > 0.0 else {}))
 
 

@@ -1,45 +1,52 @@
-"""The full set of parameters that a simulator or a controller needs, and how an estimate gives it."""
+"""The full set of parameters that a simulator or a controller needs."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from tauhat.arrays import FloatArray, frozen
-from tauhat.dynamics.terms import INERTIAL_SYMBOLS, Term
 from tauhat.errors import ExportError
-from tauhat.estimation.estimate import Estimate
-from tauhat.export.friction import LAWS, FrictionLaw
+from tauhat.export.drives import CoupledMotors, LoadedGasSpring
+from tauhat.export.friction import FrictionLaw
+from tauhat.export.plain_friction import PlainFriction, textbook_friction
 from tauhat.robots.joint import central_inertia
 from tauhat.robots.robot import Robot
 
-_RIGID = ("inertia", "inertia-simple")
 _TOLERANCE = 1e-9  # of a link's spread of mass: rounding in printed figures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StandardParameters:
-    """Rigid links, rotors and friction: `tau = inertia(q, dq, ddq) + rotor ddq + sum of friction laws (dq)`.
+    """Rigid links, rotors, springs, coupled motors and friction: all that makes the torque of a model.
 
     inertia : (n_v, 10) `m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz` about the joint frames [kg, kg m, kg m^2]
     rotor : (n_v,) rotor inertia on the joint side [kg m^2 or kg]; zeros by default
+    springs : (n_v,) stiffness of springs that balance the joints [Nm/rad or N/m]; zeros by default
     friction : the laws that the model has
+    gas_spring, motors : where the model has them
+    plain : what stands for all friction where there are words for damping and dry friction only; by default the
+        viscous and the Coulomb law, whatever other laws there are
     left_out : terms of the model that these parameters do not tell
     """
 
     inertia: FloatArray
     rotor: FloatArray = field(default_factory=lambda: np.zeros(0))
+    springs: FloatArray = field(default_factory=lambda: np.zeros(0))
     friction: tuple[FrictionLaw, ...] = ()
+    gas_spring: LoadedGasSpring | None = None
+    motors: CoupledMotors | None = None
+    plain: PlainFriction | None = None
     left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        inertia = frozen("inertia", self.inertia, (None, 10), where="standard parameters")
-        object.__setattr__(self, "inertia", inertia)
-        rotor = self.rotor if np.size(self.rotor) else np.zeros(self.n_v)
-        object.__setattr__(self, "rotor", frozen("rotor", rotor, (self.n_v,), where="standard parameters"))
+        where = "standard parameters"
+        object.__setattr__(self, "inertia", frozen("inertia", self.inertia, (None, 10), where=where))
+        for name in ("rotor", "springs"):
+            given = getattr(self, name)
+            values = given if np.size(given) else np.zeros(self.n_v)
+            object.__setattr__(self, name, frozen(name, values, (self.n_v,), where=where))
         object.__setattr__(self, "friction", tuple(self.friction))
         keys = [law.key for law in self.friction]
         if len(set(keys)) < len(keys):
@@ -53,14 +60,20 @@ class StandardParameters:
         """Number of joints."""
         return int(self.inertia.shape[0])
 
+    @property
+    def plain_friction(self) -> PlainFriction:
+        """Damping and dry friction: `plain`, or else the viscous and the Coulomb law."""
+        return textbook_friction(self.friction) if self.plain is None else self.plain
+
+    @property
+    def with_memory(self) -> tuple[str, ...]:
+        """Names of the laws whose torque depends on the way that the joints came."""
+        laws = tuple(law.key for law in self.friction if law.has_memory)
+        return (*laws, self.motors.key) if self.motors is not None and self.motors.has_memory else laws
+
     def law(self, key: str) -> FrictionLaw | None:
         """Return the law of that name, or None when the model has none."""
         return next((law for law in self.friction if law.key == key), None)
-
-    def of_joint(self, key: str, joint: int) -> float | None:
-        """Return a law's only coefficient on one joint, or None when the model has no such law."""
-        law = self.law(key)
-        return None if law is None else float(law.coefficients[0, joint])
 
 
 def plain_parameters(
@@ -88,74 +101,6 @@ def plain_parameters(
     return StandardParameters(inertia=inertia, rotor=np.zeros(0) if rotor is None else rotor, friction=tuple(laws))
 
 
-def standard_parameters(estimate: Estimate, *, without: Collection[str] = ()) -> StandardParameters:
-    """Return the full parameters of an estimate, term by term.
-
-    Parameters
-    ----------
-    without : keys of terms to leave out, so that what cannot be exported does not stop the rest
-
-    Raises
-    ------
-    ExportError
-        when the estimate has base parameters only, when the model has no inertia, when one of its terms cannot be told
-        to another program, naming it, or when `without` names a term that it does not have.
-    """
-    terms, robot = estimate.model.terms, estimate.robot
-    _check_terms([term.key for term in terms], without)
-    values = np.split(_all_values(estimate), np.cumsum([len(term.parameters(robot)) for term in terms])[:-1])
-    parts = {term.key: (term, own) for term, own in zip(terms, values, strict=True)}
-    links = next(parts[key] for key in _RIGID if key in parts)
-    rotor = _by_joint(*parts["rotor"], robot, ("Ia",))[0] if "rotor" in parts else np.zeros(robot.n_v)
-    laws = [_law(term, own, robot) for key, (term, own) in parts.items() if key in LAWS and key not in without]
-    return StandardParameters(
-        inertia=_by_joint(*links, robot, INERTIAL_SYMBOLS).T,
-        rotor=rotor,
-        friction=tuple(laws),
-        left_out=tuple(key for key in parts if key in without),
-    )
-
-
-def _check_terms(keys: Sequence[str], without: Collection[str]) -> None:
-    if not set(_RIGID) & set(keys):
-        raise ExportError("the model has no inertia to export", expected="term inertia", got=", ".join(keys))
-    allowed = {*_RIGID, "rotor", *LAWS}
-    optional = [key for key in keys if key not in {*_RIGID, "rotor"}]
-    unknown = sorted(set(without) - set(optional))
-    if unknown:
-        expected = ", ".join(optional) or "no name"
-        raise ExportError("no such term to leave out", expected=expected, got=", ".join(unknown))
-    for key in keys:
-        if key not in allowed and key not in without:
-            remedy = f"identify without it, or leave it out with `--without {key}`"
-            raise ExportError(f"term {key} is more than a function of a joint's speed", where="export", remedy=remedy)
-
-
-def _all_values(estimate: Estimate) -> FloatArray:
-    values: Any = getattr(estimate, "standard", None)
-    if values is None:
-        raise ExportError(
-            "the estimate has base parameters only, whose sums leave open what each link weighs",
-            where=estimate.robot.name,
-            remedy="identify with --physical",
-        )
-    return frozen("standard", values, (estimate.model.n_p,), where="estimate")
-
-
-def _law(term: Term, values: FloatArray, robot: Robot) -> FrictionLaw:
-    form = LAWS[term.key]
-    shape = np.array(getattr(term, form.shape_field)) if form.shape_field else np.zeros(0)
-    return FrictionLaw(key=term.key, coefficients=_by_joint(term, values, robot, form.symbols), shape=shape)
-
-
-def _by_joint(term: Term, values: FloatArray, robot: Robot, symbols: Sequence[str]) -> FloatArray:
-    """Return a term's values by symbol and joint, (n_symbols, n_v), zero where a joint has none."""
-    table = np.zeros((len(symbols), robot.n_v))
-    for parameter, value in zip(term.parameters(robot), values, strict=True):
-        table[symbols.index(parameter.symbol), parameter.joint] = value
-    return table
-
-
 def check_parameters(robot: Robot, parameters: StandardParameters) -> None:
     """Refuse parameters of another robot, and links that are no bodies.
 
@@ -175,9 +120,6 @@ def check_parameters(robot: Robot, parameters: StandardParameters) -> None:
             where=f"link of joint {broken[0]}{more}",
             remedy="identify with --physical",
         )
-    if parameters.rotor.min() < 0.0:
-        joint = robot.joints[int(parameters.rotor.argmin())].name
-        raise ExportError("the rotor inertia is negative", where=f"joint {joint}", got=f"{parameters.rotor.min():g}")
 
 
 def body_defect(inertia: FloatArray) -> str:

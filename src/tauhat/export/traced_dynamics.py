@@ -16,7 +16,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.tree import kernel_tree
-from tauhat.export.parameters import StandardParameters, second_moments
+from tauhat.export.parameters import second_moments
 from tauhat.export.tracing import Scalar, Trace
 from tauhat.robots.robot import Robot
 
@@ -46,8 +46,13 @@ class Speeds(NamedTuple):
     ddq: Sequence[Scalar]
 
 
-def traced_joints(trace: Trace, robot: Robot, parameters: StandardParameters) -> tuple[TracedJoint, ...]:
-    """Return the joints at the positions `q[0]`, `q[1]`, ... of the C function."""
+def traced_joints(trace: Trace, robot: Robot, inertia: FloatArray) -> tuple[TracedJoint, ...]:
+    """Return the joints at the positions `q[0]`, `q[1]`, ... of the C function.
+
+    Parameters
+    ----------
+    inertia : (n_v, 10) inertial parameters of the links
+    """
     tree = kernel_tree(robot)
     joints = []
     for index, joint in enumerate(robot.joints):
@@ -61,8 +66,8 @@ def traced_joints(trace: Trace, robot: Robot, parameters: StandardParameters) ->
             rotation = _plus(rotation, _plus(_scaled(_matrix(trace, cosine), c), _scaled(_matrix(trace, sine), s)))
         else:
             place = add(place, scale(times(rotation, axis), q))
-        mass, *first = parameters.inertia[index, :4]
-        xx, xy, yy, xz, yz, zz = parameters.inertia[index, 4:]
+        mass, *first = inertia[index, :4]
+        xx, xy, yy, xz, yz, zz = inertia[index, 4:]
         second = second_moments(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
         joints.append(
             TracedJoint(
@@ -74,9 +79,14 @@ def traced_joints(trace: Trace, robot: Robot, parameters: StandardParameters) ->
 
 
 def traced_inverse_dynamics(
-    trace: Trace, joints: Sequence[TracedJoint], *, gravity: FloatArray, speeds: Speeds, rotor: FloatArray
+    trace: Trace, joints: Sequence[TracedJoint], *, gravity: FloatArray, speeds: Speeds, mark: str = ""
 ) -> tuple[Scalar, ...]:
-    """Return the joint torques with the rotors' by recursive Newton-Euler."""
+    """Return the joint torques of the links by recursive Newton-Euler.
+
+    Parameters
+    ----------
+    mark : before the names of forces and moments; another one for other inertias in the same function
+    """
     zero = trace.scalar(0.0)
     still: Vector = (zero, zero, zero)
     turns: dict[int, Vector] = {-1: still}  # w
@@ -99,26 +109,25 @@ def traced_inverse_dynamics(
         spins[index] = named(trace, dw, f"dw{name}")
         pulls[index] = named(trace, a, f"a{name}")
         spreads[index] = _named(trace, _spread(turns[index], spins[index]), f"u{name}")
-        forces.append(named(trace, add(scale(a, joint.mass), times(spreads[index], joint.first)), f"f{name}"))
+        forces.append(named(trace, add(scale(a, joint.mass), times(spreads[index], joint.first)), f"{mark}f{name}"))
         turning = add(_moment_of_spread(spreads[index], joint.second), cross(joint.first, a))
-        moments.append(named(trace, turning, f"n{name}"))
-    torques = _gathered(trace, joints, forces, moments)
-    return tuple(torque + float(inertia) * ddq for torque, inertia, ddq in zip(torques, rotor, speeds.ddq, strict=True))
+        moments.append(named(trace, turning, f"{mark}n{name}"))
+    return _gathered(trace, joints, (forces, moments), mark)
 
 
 def _gathered(
-    trace: Trace, joints: Sequence[TracedJoint], forces: list[Vector], moments: list[Vector]
+    trace: Trace, joints: Sequence[TracedJoint], wrenches: tuple[list[Vector], list[Vector]], mark: str
 ) -> tuple[Scalar, ...]:
     """Return what each joint carries of the wrenches of all links beyond it."""
-    torques = [trace.scalar(0.0)] * len(joints)
+    (forces, moments), torques = wrenches, [trace.scalar(0.0)] * len(joints)
     for index in range(len(joints) - 1, -1, -1):
         joint = joints[index]
         torques[index] = dot(joint.axis, forces[index] if joint.prismatic else moments[index])
         if joint.parent >= 0:
             force, moment = _handed_inward(joint, forces[index], moments[index])
             name = joint.parent + 1
-            forces[joint.parent] = named(trace, add(forces[joint.parent], force), f"f{name}_{index + 1}")
-            moments[joint.parent] = named(trace, add(moments[joint.parent], moment), f"n{name}_{index + 1}")
+            forces[joint.parent] = named(trace, add(forces[joint.parent], force), f"{mark}f{name}_{index + 1}")
+            moments[joint.parent] = named(trace, add(moments[joint.parent], moment), f"{mark}n{name}_{index + 1}")
     return tuple(torques)
 
 

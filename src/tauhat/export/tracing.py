@@ -6,12 +6,20 @@ one, two constants) is done at once, what was calculated before is used again, a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-_BINDING = {"add": 1, "sub": 1, "neg": 2, "mul": 3}  # how strongly an operation binds; names and calls: strongest
+_BINDING = {
+    "add": 1,
+    "sub": 1,
+    "neg": 2,
+    "mul": 3,
+    "div": 3,
+}  # how strongly an operation binds; names and calls: strongest
 _STRONGEST = 4
 _LONGEST_LINE = 100
+_READS = re.compile(r"\w\[")  # an entry of an argument
 
 
 class _Node(NamedTuple):
@@ -40,6 +48,9 @@ class Scalar:
 
     def __mul__(self, other: Scalar | float) -> Scalar:
         return self.trace.multiply(self, self.trace.scalar(other))
+
+    def __truediv__(self, other: Scalar | float) -> Scalar:
+        return self.trace.divide(self, self.trace.scalar(other))
 
     def __neg__(self) -> Scalar:
         return self.trace.negate(self)
@@ -78,7 +89,7 @@ class Trace:
 
     def named(self, scalar: Scalar, name: str) -> Scalar:
         """Return the scalar, which gets a line and a name of its own unless it is a constant or has one already."""
-        if self._nodes[scalar.index].operation in {"add", "sub", "mul", "call"}:
+        if self._nodes[scalar.index].operation in {"add", "sub", "mul", "div", "call"}:
             self._names.setdefault(scalar.index, name)
         return scalar
 
@@ -126,6 +137,13 @@ class Trace:
         if first.operation == "constant" and first.value in {0.0, 1.0}:
             return right if first.value else left
         return self._noted(_Node("mul", (min(left.index, right.index), max(left.index, right.index))))
+
+    def divide(self, left: Scalar, right: Scalar) -> Scalar:
+        """Return the quotient."""
+        first, second = self._nodes[left.index], self._nodes[right.index]
+        if second.operation == "constant" and second.value != 0.0:
+            return self.multiply(left, self.scalar(1.0 / second.value))
+        return left if _is(first, 0.0) else self._noted(_Node("div", (left.index, right.index)))
 
     def negate(self, scalar: Scalar) -> Scalar:
         """Return the negative."""
@@ -195,7 +213,12 @@ class _Writer:
                 lines.append(f"const double {name} = {text};")
                 text, binding = name, _STRONGEST
             self._written[index] = (text, binding)
-        return (*lines, *(f"{target} = {self._written[value.index][0]};" for target, value in self._results.items()))
+        texts = [self._written[value.index][0] for value in self._results.values()]
+        # A result that reads an argument waits in a name of its own: the results before it may be written over it.
+        waiting = {text: f"y{place}" for place, text in enumerate(dict.fromkeys(texts)) if _READS.search(text)}
+        lines += [f"const double {name} = {text};" for text, name in waiting.items()]
+        values = (waiting.get(text, text) for text in texts)
+        return (*lines, *(f"{target} = {value};" for target, value in zip(self._results, values, strict=True)))
 
     def _expression(self, node: _Node) -> tuple[str, int]:
         if node.operation == "constant":
@@ -207,8 +230,8 @@ class _Writer:
         binding = _BINDING[node.operation]
         if node.operation == "neg":
             return f"-{self._bound(node.operands[0], _BINDING['mul'])}", binding
-        sign = {"add": "+", "sub": "-", "mul": "*"}[node.operation]
-        # The right operand of a difference, and of any product or sum that is one itself, keeps its brackets.
+        sign = {"add": "+", "sub": "-", "mul": "*", "div": "/"}[node.operation]
+        # The right operand of a difference or quotient, and one that binds no stronger, keeps its brackets.
         return f"{self._bound(node.operands[0], binding)} {sign} {self._bound(node.operands[1], binding + 1)}", binding
 
     def _bound(self, index: int, binding: int) -> str:

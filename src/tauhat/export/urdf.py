@@ -13,7 +13,8 @@ from tauhat.arrays import FloatArray
 from tauhat.errors import ExportError, TauhatWarning
 from tauhat.export.bodies import central_body, row
 from tauhat.export.markup import Edit, Markup, Place, read_markup, with_attributes, with_child
-from tauhat.export.parameters import StandardParameters, check_parameters
+from tauhat.export.parameters import StandardParameters
+from tauhat.export.simulators import ToldParameters, told_parameters
 from tauhat.export.urdf_links import LinkShares, check_same_kinematics, locked_positions, share_among_links
 from tauhat.files import replace_file
 from tauhat.robots.robot import Robot
@@ -24,7 +25,7 @@ from tauhat.robots.urdf_tree import check_tree
 from tauhat.robots.urdf_xml import parse_untrusted_xml
 
 _AGREEMENT = 1e-9  # of a link's largest parameter: what may be lost on the way through the text
-_WORDS = {"viscous": "damping", "coulomb": "friction"}
+_WORDS = ("damping", "friction")
 _MOMENTS = ("ixx", "ixy", "iyy", "ixz", "iyz", "izz")
 
 
@@ -37,6 +38,7 @@ class FilledUrdf:
     emptied : links fixed to those; their inertia is in them and is zero here
     kept : links behind joints that were locked; they keep the file's inertia
     left_out : what URDF has no word for, with the largest coefficient
+    set_to_zero : what came out negative and cannot be, by name, with its value
     """
 
     content: bytes
@@ -44,6 +46,7 @@ class FilledUrdf:
     emptied: tuple[str, ...]
     kept: tuple[str, ...]
     left_out: Mapping[str, float]
+    set_to_zero: Mapping[str, float]
 
     def save(self, path: str | Path) -> None:
         """Write the file whole or not at all.
@@ -65,7 +68,7 @@ def fill_urdf(source: str | Path, robot: Robot, parameters: StandardParameters) 
     ----------
     source : path of the URDF that the robot was made from, or its text (which begins with "<")
     robot : with the same joints, some of which may be locked
-    parameters : of the robot; friction that they do not have stays as it is in the file
+    parameters : of the robot; damping or dry friction that they do not have stays as it is in the file
 
     Raises
     ------
@@ -73,8 +76,13 @@ def fill_urdf(source: str | Path, robot: Robot, parameters: StandardParameters) 
         the robot is not of this URDF, or a link is no body, naming it.
     RobotError
         the URDF cannot be read.
+
+    Warns
+    -----
+    TauhatWarning
+        when something is negative and is set to zero, and when damping and dry friction are far from the model's.
     """
-    check_parameters(robot, parameters)
+    told = told_parameters(robot, parameters)
     content = urdf_source(source)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TauhatWarning)  # about figures that are replaced
@@ -85,7 +93,7 @@ def fill_urdf(source: str | Path, robot: Robot, parameters: StandardParameters) 
     check_same_kinematics(whole, robot, where=content.where)
     shares = share_among_links(description, robot, parameters)
     markup = read_markup(content.content, where=content.where, encoding=_known_encoding(content))
-    edits = [*_link_edits(markup, description, shares), *_joint_edits(markup, robot, parameters)]
+    edits = [*_link_edits(markup, description, shares), *_joint_edits(markup, robot, told)]
     written = markup.edited(edits)
     _check_written(markup.decoded(written), robot, parameters, locked)
     emptied = tuple(link for link in shares.emptied if description.links[link] is not None)
@@ -94,7 +102,8 @@ def fill_urdf(source: str | Path, robot: Robot, parameters: StandardParameters) 
         filled=tuple(shares.filled),
         emptied=emptied,
         kept=shares.kept,
-        left_out=_untold(markup, robot, parameters),
+        left_out=_untold(markup, robot, told),
+        set_to_zero=told.set_to_zero,
     )
 
 
@@ -153,28 +162,29 @@ def _required(place: Place, tag: str) -> Place:
     return child
 
 
-def _joint_edits(markup: Markup, robot: Robot, parameters: StandardParameters) -> list[Edit]:
+def _joint_edits(markup: Markup, robot: Robot, told: ToldParameters) -> list[Edit]:
     edits: list[Edit] = []
     places = {place.texts["name"].strip(): place for place in markup.root.named("joint")}
     for index, name in enumerate(robot.joint_names):
-        told = {word: parameters.of_joint(key, index) for key, word in _WORDS.items()}
-        values = {word: row(value) for word, value in told.items() if value is not None}
+        friction = zip(_WORDS, told.friction.of_joint(index), strict=True)
+        values = {word: row(value) for word, value in friction if value is not None}
         dynamics = places[name].child("dynamics")
         if dynamics is None and any(float(value) for value in values.values()):
             edits.append(with_child(markup, places[name], [f"<dynamics{_written(values)}/>"]))
         elif dynamics is not None:
-            known = {"armature": row(parameters.rotor[index])} if "armature" in dynamics.attributes else {}
+            known = {"armature": row(told.rotor[index])} if "armature" in dynamics.attributes else {}
             edits += with_attributes(dynamics, values | known)
     return edits
 
 
-def _untold(markup: Markup, robot: Robot, parameters: StandardParameters) -> dict[str, float]:
+def _untold(markup: Markup, robot: Robot, told: ToldParameters) -> dict[str, float]:
     """Return what the file cannot say -> its largest coefficient."""
-    untold = {law.key: law.largest for law in parameters.friction if law.key not in _WORDS and law.largest > 0.0}
     places = {place.texts["name"].strip(): place.child("dynamics") for place in markup.root.named("joint")}
-    told = [place is not None and "armature" in place.attributes for place in (places[n] for n in robot.joint_names)]
-    rotor = float(np.where(told, 0.0, parameters.rotor).max())
-    return untold | ({"rotor": rotor} if rotor > 0.0 else {})
+    has_word = [
+        place is not None and "armature" in place.attributes for place in (places[name] for name in robot.joint_names)
+    ]
+    rotor = float(np.where(has_word, 0.0, told.rotor).max())
+    return {**told.left_out, **({"rotor": rotor} if rotor > 0.0 else {})}
 
 
 def _check_written(text: str, robot: Robot, parameters: StandardParameters, locked: Mapping[str, float]) -> None:

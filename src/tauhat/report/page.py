@@ -16,6 +16,7 @@ from tauhat.excitation.trajectory import Trajectory
 from tauhat.files import write_text
 from tauhat.recordings.findings import Finding
 from tauhat.robots.robot import Robot
+from tauhat.studies.comparison import Comparison
 from tauhat.verification.prediction import Verification
 
 if TYPE_CHECKING:
@@ -98,6 +99,24 @@ def write_motion_report(
     case = motion_case(robot, trajectory, counted=counted, limits=limits, margins=margins)
     sections = [section(case) for section in MOTION_SECTIONS]
     write_text(path, _page(sections, title=f"{robot.name}: designed motion", version=__version__))
+    return Path(path)
+
+
+def write_comparison(path: str | Path, comparison: Comparison, *, title: str) -> Path:
+    """Write a self-contained HTML page that shows models and estimators beside each other, and return its path.
+
+    Raises
+    ------
+    MissingExtraError
+        when plotly or jinja2 is not installed.
+    OutputError
+        when the file cannot be written.
+    """
+    _require_libraries()
+    from tauhat import __version__
+    from tauhat.report.sections.comparison import comparison as section
+
+    write_text(path, _page([section(comparison)], title=title, version=__version__))
     return Path(path)
 
 

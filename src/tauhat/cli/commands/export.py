@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tauhat.cli.options import EstimateArgument, JsonOption
-from tauhat.cli.output import show, unbroken
+from tauhat.cli.output import show
 from tauhat.cli.reporting import working
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from tauhat.estimation.estimate import Estimate
     from tauhat.export import StandardParameters
 
@@ -56,21 +54,19 @@ class Options:
 
 def run(options: Options) -> None:
     """Write an estimate for other programs: the robot's own URDF, a MuJoCo model, C code for a controller."""
+    from tauhat.cli.views.export import export_view
     from tauhat.estimation.estimate import load_estimate
     from tauhat.export import standard_parameters
-    from tauhat.files import check_output
 
     _check_options(options)
     estimate = load_estimate(options.estimate)
-    for path in (options.urdf, options.mjcf, options.c):
-        if path is not None:
-            check_output(path, inputs=[options.estimate, *([options.source] if options.source else [])])
+    _check_outputs(options, estimate)
     without = tuple(key.strip() for key in options.without.split(",") if key.strip())
     parameters = standard_parameters(estimate, without=without)
     with working("writing"):
         written = _written(options, estimate, parameters)
-    document = {"robot": estimate.robot.name, "without": list(parameters.left_out), **written}
-    show(document, lambda: _view(document), as_json=options.as_json)
+    document = _document(estimate, parameters, written)
+    show(document, lambda: export_view(document), as_json=options.as_json)
 
 
 def _check_options(options: Options) -> None:
@@ -78,6 +74,21 @@ def _check_options(options: Options) -> None:
         raise typer.BadParameter("nothing to write; give --urdf, --mjcf or --c")
     if options.source is not None and options.urdf is None:
         raise typer.BadParameter("--source is of use with --urdf only")
+
+
+def _check_outputs(options: Options, estimate: Estimate) -> None:
+    """Refuse outputs that cannot be written, and a new URDF in the place of the robot's own."""
+    from tauhat.errors import OutputError
+    from tauhat.files import check_output
+
+    inputs = [options.estimate, *([options.source] if options.source else [])]
+    for path in (options.urdf, options.mjcf, options.c):
+        if path is not None:
+            check_output(path, inputs=inputs)
+    own = options.urdf
+    if own is not None and options.source is None and own.name == estimate.robot.source and own.exists():
+        remedy = "choose another name; --source fills it with what was identified"
+        raise OutputError("would overwrite the robot's own URDF", where=own, remedy=remedy)
 
 
 def _written(options: Options, estimate: Estimate, parameters: StandardParameters) -> dict[str, Any]:
@@ -90,43 +101,39 @@ def _written(options: Options, estimate: Estimate, parameters: StandardParameter
     if options.mjcf is not None:
         model = mjcf(estimate.robot, parameters)
         model.save(options.mjcf)
-        documents["mjcf"] = {"path": str(options.mjcf), "left_out": dict(model.left_out)}
+        documents["mjcf"] = _told(options.mjcf, model.left_out, model.set_to_zero)
     if options.c is not None:
         fingerprint = estimate.model.fingerprint
         header = ccode(estimate.robot, parameters, prefix=options.prefix, fingerprint=fingerprint)
         header.save(options.c)
-        documents["c"] = {"path": str(options.c), "left_out": dict(header.left_out)}
+        memory = {"memory": list(parameters.with_memory)}
+        documents["c"] = _told(options.c, header.left_out, header.set_to_zero) | memory
     return documents
 
 
 def _write_urdf(path: Path, source: Path | None, estimate: Estimate, parameters: StandardParameters) -> dict[str, Any]:
-    from tauhat.errors import ExportError
     from tauhat.export import fill_urdf, new_urdf
 
-    if source is not None:
-        filled = fill_urdf(source, estimate.robot, parameters)
-        filled.save(path)
-        links = {"filled": list(filled.filled), "emptied": list(filled.emptied), "kept": list(filled.kept)}
-        return {"path": str(path), "left_out": dict(filled.left_out), **links}
-    if estimate.robot.source.lower().endswith(".urdf"):
-        raise ExportError("the robot has a URDF of its own", where=estimate.robot.source, remedy="give it by --source")
-    made = new_urdf(estimate.robot, parameters)
-    made.save(path)
-    return {"path": str(path), "left_out": dict(made.left_out)}
+    if source is None:
+        made = new_urdf(estimate.robot, parameters)
+        made.save(path)
+        own = estimate.robot.source if estimate.robot.source.lower().endswith(".urdf") else None
+        return _told(path, made.left_out, made.set_to_zero) | {"own": own}
+    filled = fill_urdf(source, estimate.robot, parameters)
+    filled.save(path)
+    links = {"filled": list(filled.filled), "emptied": list(filled.emptied), "kept": list(filled.kept)}
+    return _told(path, filled.left_out, filled.set_to_zero) | links
 
 
-def _view(document: Mapping[str, Any]) -> Iterator[RenderableType]:
-    if document["without"]:
-        yield f"Left out as asked: {', '.join(document['without'])}."
-    for name in ("urdf", "mjcf", "c"):
-        told = document.get(name)
-        if told is None:
-            continue
-        yield unbroken(f"Written: {told['path']}")
-        if told.get("emptied"):
-            yield f"  fixed to a moving link, which holds their inertia now: {', '.join(told['emptied'])}"
-        if told.get("kept"):
-            yield f"  behind locked joints, kept as they were: {', '.join(told['kept'])}"
-        if told["left_out"]:
-            sizes = ", ".join(f"{key} (up to {size:.3g})" for key, size in told["left_out"].items())
-            yield f"  the format has no word for: {sizes}"
+def _told(path: Path, left_out: Mapping[str, float], set_to_zero: Mapping[str, float]) -> dict[str, Any]:
+    return {"path": str(path), "left_out": dict(left_out), "set_to_zero": dict(set_to_zero)}
+
+
+def _document(estimate: Estimate, parameters: StandardParameters, written: Mapping[str, Any]) -> dict[str, Any]:
+    fitted = parameters.plain_friction.approximations if written.keys() & {"urdf", "mjcf"} else ()
+    return {
+        "robot": estimate.robot.name,
+        "without": list(parameters.left_out),
+        "approximations": [asdict(one) for one in fitted],
+        **written,
+    }

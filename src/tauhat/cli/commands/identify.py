@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from tauhat.dynamics.model import TorqueModel
     from tauhat.estimation.estimate import Estimate
+    from tauhat.estimation.physical_constraints import PhysicalConstraints
     from tauhat.recordings.recording import Recording
 
 _SHOWN = ("tauhat_version", "fingerprint", "parameters", "fit", "structure", "physical", "processing", "inputs")
@@ -50,6 +51,15 @@ class Options:
         bool,
         typer.Option("--physical", help="Keep every link a possible body, friction positive; gives all parameters."),
     ] = False
+    constraints: Annotated[
+        Path | None,
+        typer.Option(
+            "--constraints",
+            metavar="CONSTRAINTS.toml",
+            help="The same with bounds on masses, centres and bodies of links.",
+            show_default=False,
+        ),
+    ] = None
     essential: Annotated[
         bool, typer.Option("--essential", help="Drop the parameters that the recordings cannot see.")
     ] = False
@@ -64,7 +74,7 @@ def run(options: Options) -> None:
     """Identify a robot's torque model from recordings and write it as an estimate file."""
     from tauhat.cli.inputs import averaged, read_recordings, robot_of_recordings
     from tauhat.cli.models import model_of
-    from tauhat.estimation.least_squares import estimator_named
+    from tauhat.estimation.estimators import estimator_named
     from tauhat.files import check_output
 
     estimator_named(options.estimator)
@@ -86,21 +96,23 @@ def _identified(model: TorqueModel, recordings: Sequence[Recording], options: Op
     """Return the estimate, of the model that cross-validation chose where that was asked for."""
     from tauhat.cli.models import AUTO
     from tauhat.estimation.essential import EssentialLeastSquares
+    from tauhat.estimation.estimators import estimator_named
     from tauhat.estimation.identify import identify
-    from tauhat.estimation.least_squares import estimator_named
-    from tauhat.estimation.physical_constraints import PhysicalConstraints
-    from tauhat.estimation.structure import select_model
+    from tauhat.estimation.selecting import identify_selected
 
     named = estimator_named(options.estimator)
     estimator = EssentialLeastSquares(inner=named) if options.essential else named
-    constraints = PhysicalConstraints() if options.physical else None
-    if options.model.strip() != AUTO:
-        return identify(model, recordings, estimator=estimator, cutoff=options.cutoff, constraints=constraints)
-    chosen = select_model(model, recordings, estimator=estimator, cutoff=options.cutoff)
-    estimate = identify(
-        chosen.model, recordings, estimator=estimator, processing=chosen.processing, constraints=constraints
-    )
-    return replace(estimate, structure=chosen.structure)
+    way = identify_selected if options.model.strip() == AUTO else identify
+    return way(model, recordings, estimator=estimator, cutoff=options.cutoff, constraints=_constraints(options))
+
+
+def _constraints(options: Options) -> PhysicalConstraints | None:
+    from tauhat.estimation.constraints_file import load_constraints
+    from tauhat.estimation.physical_constraints import PhysicalConstraints
+
+    if options.constraints is not None:
+        return load_constraints(options.constraints)
+    return PhysicalConstraints() if options.physical else None
 
 
 def _document(estimate: Estimate, path: Path) -> dict[str, Any]:

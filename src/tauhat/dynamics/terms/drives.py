@@ -69,8 +69,8 @@ class GasSpring(Term):
 
     The cylinder turns about a point at `distance` from the joint's axis and holds the link at `lever` from it. With the
     angle `d = q + angle` between the two, the length is `l = sqrt(D^2 + k^2 - 2 D k cos d)`, the gas is compressed by
-    `(l - l0) A` from `volume` at the shortest length `l0 = D - k`. At constant temperature its pressure times its volume
-    stays `Gs`, its energy is `-Gs ln(volume - (l - l0) A)`, and the drive must overcome the derivative of that,
+    `(l - l0) A` from `volume` at the shortest length `l0 = D - k`. At constant temperature pressure times volume stays
+    `Gs`, the energy is `-Gs ln(volume - (l - l0) A)`, and the drive must overcome the derivative of that,
         tau = Gs A / (volume - (l - l0) A) * D k sin(d) / l
     which pulls towards `d = 0`.
 

@@ -21,6 +21,7 @@ WIDTHS = (1e-4, 1e-3, 3e-3, 1e-2, 2e-2, 4e-2)  # of the smooth sign, in parts of
 STRIBECK_SPEEDS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4)  # in parts of the top speed
 POLYNOMIAL_SPEEDS = (0.005, 0.007, 0.01, 0.014, 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4)  # many local minima
 _TYPICAL_SPEED = 0.05  # [rad/s or m/s] a Stribeck speed before any is chosen
+_FARTHEST = 300.0  # exponent of a bump that is over: a motion that never is slow sees it badly, not as a zero column
 _SHARPNESS = 0.1  # width of the sign beside a Stribeck curve, in parts of its speed
 
 
@@ -194,7 +195,7 @@ class Stribeck(ShapedTerm):
     ) -> tuple[FloatArray, FloatArray | None]:
         """Return the bump beside zero speed; pointwise."""
         ratio = motion.dq / self.chosen(robot.n_v, _TYPICAL_SPEED)
-        return (np.exp(-(ratio**2)) * np.tanh(ratio / _SHARPNESS))[:, None], state
+        return (_decayed(ratio**2) * np.tanh(ratio / _SHARPNESS))[:, None], state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -228,7 +229,7 @@ class PolynomialFriction(ShapedTerm):
         """Return the five functions of the speed; pointwise."""
         v, speeds = motion.dq, self.chosen(robot.n_v, _TYPICAL_SPEED)
         sign, size = np.tanh(v / (_SHARPNESS * speeds)), np.abs(v)
-        return np.stack([sign, v, size * v, v**3, np.exp(-size / speeds) * sign], axis=1), state
+        return np.stack([sign, v, size * v, v**3, _decayed(size / speeds) * sign], axis=1), state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,6 +251,10 @@ class Offset(JointTerm):
 
     def pull(self, robot: Robot, motion: Motion, bars: tuple[FloatArray, ...], gradient: MotionGradient) -> None:
         """Add nothing: a constant does not depend on the motion."""
+
+
+def _decayed(exponent: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(-np.minimum(exponent, _FARTHEST)))
 
 
 def per_speed(joint: Joint) -> str:

@@ -28,19 +28,24 @@ SCALES = (0.1, 0.3, 1.0, 3.0)  # of the lengths
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def dahl_kernel(q, lengths, states, out):  # type: ignore[no-untyped-def]
-    """Step `z+ = s + (z - s) exp(-|q+ - q| / x0)`; q (n_v, n_t), lengths (n_v, k), states (n_v, k + 1): last q, z."""
+    """Fill `out` with the states along q (n_v, n_t); lengths (n_v, k); states (n_v, k + 1): last position, last z."""
     for j in range(q.shape[0]):
         for i in range(lengths.shape[1]):
-            last, z = states[j, 0], states[j, i + 1]
-            for k in range(q.shape[1]):
-                moved = q[j, k] - last
-                last = q[j, k]
-                if moved != 0.0:
-                    sign = 1.0 if moved > 0.0 else -1.0
-                    z = sign + (z - sign) * np.exp(-abs(moved) / lengths[j, i])
-                out[j, i, k] = z
-            states[j, i + 1] = z
+            states[j, i + 1] = _stepped(q[j], states[j, 0], states[j, i + 1], lengths[j, i], out[j, i])
         states[j, 0] = q[j, q.shape[1] - 1]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _stepped(q, last, z, length, out):  # type: ignore[no-untyped-def]
+    """Step `z+ = s + (z - s) exp(-|q+ - q| / x0)` along q (n_t,) and return the last z."""
+    for k in range(q.size):
+        moved = q[k] - last
+        last = q[k]
+        if moved != 0.0:
+            sign = 1.0 if moved > 0.0 else -1.0
+            z = sign + (z - sign) * np.exp(-abs(moved) / length)
+        out[k] = z
+    return z
 
 
 def dahl_states(q: FloatArray, lengths: FloatArray, state: FloatArray | None) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,161 @@
+"""`tauhat compare`: models and estimators beside each other, judged on unseen recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tauhat.cli.options import (
+    CutoffOption,
+    JsonOption,
+    LockOption,
+    LogArguments,
+    MapOption,
+    RobotArgument,
+    RowsOption,
+    Window,
+    window,
+)
+from tauhat.cli.output import show, unbroken
+from tauhat.cli.reporting import say, working
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from tauhat.recordings.recording import Recording
+    from tauhat.robots.robot import Robot
+    from tauhat.studies import Candidate, Comparison
+
+_PHYSICAL = "+physical"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What `tauhat compare` takes."""
+
+    robot: RobotArgument
+    logs: LogArguments
+    unseen: Annotated[
+        list[Path],
+        typer.Option(
+            "--unseen",
+            metavar="LOG",
+            help="Recording to judge on; may be repeated.",
+            show_default=False,
+            readable=False,
+        ),
+    ]
+    models: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model",
+            metavar="TERMS",
+            help="As for identify, with +physical for --physical; may be repeated.",
+            show_default="plain, robust",
+        ),
+    ] = None
+    estimators: Annotated[
+        list[str] | None,
+        typer.Option("--estimator", metavar="NAME", help="May be repeated.", show_default="wls"),
+    ] = None
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="PAGE.html", help="Page with table and figure.", show_default=False),
+    ] = None
+    map_file: MapOption = None
+    unseen_map: Annotated[
+        Path | None,
+        typer.Option(
+            "--unseen-map", metavar="MAP.toml", help="Map of the unseen logs.", show_default="as --map", readable=False
+        ),
+    ] = None
+    rows: RowsOption = None
+    unseen_rows: Annotated[
+        Window | None,
+        typer.Option(
+            "--unseen-rows",
+            metavar="FROM:TO",
+            parser=window,
+            help="Window of rows of each unseen log.",
+            show_default=False,
+        ),
+    ] = None
+    cutoff: CutoffOption = None
+    lock: LockOption = None
+    as_json: JsonOption = False
+
+
+def run(options: Options) -> None:
+    """Identify with several models and estimators, and compare them on recordings that none was fitted to."""
+    from tauhat.cli.inputs import read_recordings, robot_of_recordings
+    from tauhat.studies import compare
+
+    with working("reading"):
+        fitted = read_recordings(options.logs, map_file=options.map_file, rows=options.rows)
+        unseen_map = options.unseen_map or options.map_file
+        judged = read_recordings(options.unseen, map_file=unseen_map, rows=options.unseen_rows)
+        robot = robot_of_recordings(options.robot, (*fitted, *judged), locked=options.lock)
+    candidates = _candidates(robot, fitted, options)
+    with working("comparing"):
+        result = compare(candidates, fitted, judged, cutoff=options.cutoff, tell=lambda name: say("identifying", name))
+    document = result.to_dict()
+    if options.output is not None:
+        from tauhat.report.page import write_comparison
+
+        write_comparison(options.output, result, title=f"{robot.name}: models and estimators compared")
+        document["page"] = str(options.output)
+    show(document, lambda: _view(result, options), as_json=options.as_json)
+
+
+def _candidates(robot: Robot, fitted: tuple[Recording, ...], options: Options) -> list[Candidate]:
+    """Return every model with every estimator, models in the outer loop."""
+    from tauhat.cli.models import AUTO, model_of
+    from tauhat.estimation.estimators import estimator_named
+    from tauhat.estimation.physical_constraints import PhysicalConstraints
+    from tauhat.studies import Candidate
+
+    named = [estimator_named(name) for name in options.estimators or ["wls"]]
+    return [
+        Candidate(
+            name=text.strip(),
+            model=model_of(robot, text.strip().removesuffix(_PHYSICAL), fitted),
+            estimator=estimator,
+            selected=text.strip().removesuffix(_PHYSICAL) == AUTO,
+            constraints=PhysicalConstraints() if text.strip().endswith(_PHYSICAL) else None,
+        )
+        for text in options.models or ["plain", "robust"]
+        for estimator in named
+    ]
+
+
+def _view(result: Comparison, options: Options) -> Iterator[RenderableType]:
+    from rich.markup import escape
+
+    from tauhat.cli.views.tables import graded, table
+
+    made = table(
+        "Error over torque, by model and estimator",
+        ("model", "estimator"),
+        ("fit", *(f"unseen {index + 1}" for index in range(len(result.judged))), "parameters", "s"),
+    )
+    for outcome in result.outcomes:
+        unseen = [graded(error) for error in outcome.unseen] or ["failed"] * len(result.judged)
+        fit = "" if outcome.failure else graded(outcome.fit)
+        made.add_row(
+            escape(outcome.model), outcome.estimator, fit, *unseen, str(outcome.n_parameters), f"{outcome.seconds:.1f}"
+        )
+    yield made
+    for index, name in enumerate(result.judged):
+        yield unbroken(f"unseen {index + 1}: {name}")
+    for outcome in result.outcomes:
+        if outcome.failure:
+            yield unbroken(f"{outcome.model}, {outcome.estimator}: {outcome.failure}")
+    best = result.best
+    if best is not None:
+        yield unbroken(f"Least error on unseen recordings: {best.model} with {best.estimator}.")
+    if options.output is not None:
+        yield unbroken(f"Written: {options.output}")

@@ -1,0 +1,146 @@
+"""The controller as part of the identification problem: law, gains and reference of the robot that was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, frozen
+from tauhat.control.laws import PDGravity, TrackingLaw
+from tauhat.dynamics.forward import Masses, rotor_mass_matrix
+from tauhat.dynamics.simulated_arm import Integrator
+from tauhat.errors import ModelError
+from tauhat.robots.robot import Robot
+
+_POSES = 32  # along the motion at which the mass matrix is looked at
+
+
+class Positions(Protocol):
+    """A motion at given times, (n_t, n_v) each."""
+
+    @property
+    def q(self) -> FloatArray:
+        """Position [rad or m]."""
+        ...
+
+    @property
+    def dq(self) -> FloatArray:
+        """Velocity [rad/s or m/s]."""
+        ...
+
+    @property
+    def ddq(self) -> FloatArray:
+        """Acceleration [rad/s^2 or m/s^2]."""
+        ...
+
+
+class Reference(Protocol):
+    """A motion that the robot was asked for, in the time of the recording; every designed trajectory is one."""
+
+    def sample(self, t: FloatArray) -> Positions:
+        """Return the motion at the times t, (n_t,) [s]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampledReference:
+    """A reference that was logged: on straight lines between its samples, at rest before the first and behind the last.
+
+    Where the controller takes no reference of the speed, as a cascade of position and speed loops, dq is zero.
+
+    t : (n_t,) increasing [s]
+    q, dq, ddq : (n_t, n_v) [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
+    """
+
+    t: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+
+    def __post_init__(self) -> None:
+        t = frozen("t", self.t, (None,), where="reference")
+        if (np.diff(t) <= 0.0).any():
+            raise ModelError("time does not increase", where="reference")
+        object.__setattr__(self, "t", t)
+        shape = frozen("q", self.q, (t.size, None), where="reference").shape
+        for name in ("q", "dq", "ddq"):
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, where="reference"))
+
+    def sample(self, t: FloatArray) -> SampledReference:
+        """Return the reference at the times t, (n_t,) [s]."""
+        columns = (
+            [np.interp(t, self.t, column) for column in signal.T] for signal in (self.q, self.dq, self.ddq)
+        )  # fmt: skip
+        q, dq, ddq = (np.array(rows).T for rows in columns)
+        return SampledReference(t=t, q=q, dq=dq, ddq=ddq)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClosedLoop:
+    """How the recorded robot was driven, as far as it is known.
+
+    law : with its gains; its gravity feedforward is that of the robot's nominal inertia, as the controller's would be.
+        None: critically damped PD with the gravity of the simulated parameters, gains tuned to `bandwidth` anew for
+        every set of parameters, so that the closed loop stays the same
+    bandwidth : of the tuned law [Hz]
+    references : one a recording, in its time; empty: the measured position, low-passed at `reference_cutoff`
+    reference_cutoff : [Hz], that of the processing where it is None
+    substeps : integration steps between two samples
+    integrator : "leapfrog", or "runge-kutta" for smooth friction
+    """
+
+    law: TrackingLaw | None = None
+    bandwidth: float = 10.0
+    references: Sequence[Reference] = ()
+    reference_cutoff: float | None = None
+    substeps: int = 1
+    integrator: Integrator = "leapfrog"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "references", tuple(self.references))
+        for name in ("bandwidth", "reference_cutoff"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < np.inf:
+                raise ModelError(f"closed loop: {name} must be a positive frequency", got=f"{value} Hz")
+        if self.substeps < 1:
+            raise ModelError("closed loop: at least one step a sample is needed", got=self.substeps)
+        if self.integrator not in {"leapfrog", "runge-kutta"}:
+            raise ModelError("closed loop: unknown integrator", expected="leapfrog or runge-kutta", got=self.integrator)
+
+    def law_for(self, robot: Robot, masses: Masses, q: FloatArray) -> TrackingLaw:
+        """Return the law, tuned to these masses along the motion q (n_t, n_v) where none is given.
+
+        `kp = w^2 D, kd = 2 w D` with `w = 2 pi bandwidth` and D the mean diagonal of the mass matrix.
+
+        Raises
+        ------
+        ModelError
+            when the law is of another number of joints.
+        """
+        if self.law is not None:
+            if self.law.n_v != robot.n_v:
+                raise ModelError("the law does not fit the robot", expected=f"{robot.n_v} joints", got=self.law.n_v)
+            return self.law
+        poses = q[:: max(1, len(q) // _POSES)]
+        mass = rotor_mass_matrix(robot, poses, masses=masses)
+        diagonal = np.maximum(np.diagonal(mass, axis1=1, axis2=2).mean(axis=0), 0.0)
+        w = 2.0 * np.pi * self.bandwidth
+        return PDGravity(kp=w**2 * diagonal, kd=2.0 * w * diagonal)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data: what an estimate keeps of the loop it was found with; references by their kind."""
+        law: dict[str, Any] | None = None
+        if self.law is not None:
+            gains = {"kp": self.law.kp.tolist(), "kd": self.law.kd.tolist(), "ki": self.law.integral_gain.tolist()}
+            law = {"law": self.law.key, **gains}
+        return {
+            "law": law,
+            "bandwidth": None if law else self.bandwidth,
+            "references": [type(reference).__name__ for reference in self.references] or "measured",
+            "reference_cutoff": self.reference_cutoff,
+            "substeps": self.substeps,
+            "integrator": self.integrator,
+        }

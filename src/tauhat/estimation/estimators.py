@@ -1,0 +1,40 @@
+"""Every estimator by its name."""
+
+from __future__ import annotations
+
+from tauhat.errors import ModelError
+from tauhat.estimation.hybrid import HybridLeastSquares
+from tauhat.estimation.least_squares import Estimator, OrdinaryLeastSquares, WeightedLeastSquares
+from tauhat.estimation.maximum_likelihood import MaximumLikelihood
+from tauhat.estimation.prior import PriorLeastSquares, RidgeLeastSquares
+from tauhat.estimation.recursive import RecursiveLeastSquares
+from tauhat.estimation.robust import BisquareLeastSquares, CauchyLeastSquares, HuberLeastSquares
+from tauhat.estimation.total_least_squares import TotalLeastSquares
+
+_METHODS: tuple[type[Estimator], ...] = (
+    OrdinaryLeastSquares,
+    WeightedLeastSquares,
+    HuberLeastSquares,
+    BisquareLeastSquares,
+    CauchyLeastSquares,
+    TotalLeastSquares,
+    RidgeLeastSquares,
+    PriorLeastSquares,
+    MaximumLikelihood,
+    RecursiveLeastSquares,
+    HybridLeastSquares,
+)
+ESTIMATORS: dict[str, type[Estimator]] = {method.key: method for method in _METHODS}
+
+
+def estimator_named(key: str) -> Estimator:
+    """Return the estimator of this name in its default settings.
+
+    Raises
+    ------
+    ModelError
+        when there is none.
+    """
+    if key not in ESTIMATORS:
+        raise ModelError("unknown estimator", expected=", ".join(ESTIMATORS), got=key)
+    return ESTIMATORS[key]()

@@ -1,0 +1,210 @@
+"""What all estimators that simulate have in common: the controller, the passes, and why they ended."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tauhat.arrays import FloatArray
+from tauhat.dynamics.forward import nominal_masses
+from tauhat.dynamics.simulated_arm import Moved
+from tauhat.dynamics.terms import INERTIAL_SYMBOLS
+from tauhat.errors import ModelError, SimulationError
+from tauhat.estimation.closed_loop import ClosedLoop
+from tauhat.estimation.evidence import Evidence, evidence_from_rows
+from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows
+from tauhat.estimation.problem import Problem
+from tauhat.estimation.rows import Rows
+from tauhat.estimation.simulated_runs import SimulatedRuns, simulated_runs
+from tauhat.estimation.solution import Solution, joint_residuals
+
+_HALVINGS = 4  # of a pass whose parameters move no robot, before it is given up
+_UNKNOWN_LOOP = "give the robot's own law, gains and reference; without them the simulation is not the recorded motion"
+
+
+class Found(NamedTuple):
+    """What one pass found, before it is tried in simulation.
+
+    values : (n_b,)
+    weights : (n_v,) of the joints' equations
+    evidence : what was solved
+    """
+
+    values: FloatArray
+    weights: FloatArray
+    evidence: Evidence
+
+
+class Tried(NamedTuple):
+    """Parameters (n_b,) that move a robot, and how it moves in every run."""
+
+    values: FloatArray
+    motions: tuple[Moved, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulationEstimator(Estimator):
+    """A method that simulates the recorded robot with its controller, again and again.
+
+    loop : law, gains and reference
+    inner : least squares for the first values and, where the method has one, for the linear problem of every pass
+    tolerance : a pass that moves the predicted torque by less than this part of the residual is the last
+    most_passes : after which the method stops in any case
+    """
+
+    loop: ClosedLoop = field(default_factory=ClosedLoop)
+    inner: Estimator = field(default_factory=WeightedLeastSquares)
+    tolerance: float = 0.02
+    most_passes: int = 15
+
+    def __post_init__(self) -> None:
+        super(SimulationEstimator, self).__post_init__()
+        if not 0.0 < self.tolerance < 1.0:
+            raise ModelError(f"{self.key}: tolerance out of range", expected="0 to 1", got=self.tolerance)
+        if self.most_passes < 1:
+            raise ModelError(f"{self.key}: at least one pass is needed", got=self.most_passes)
+
+    def settings(self) -> dict[str, Any]:
+        """Return plain data: loop, inner method and limits."""
+        return {
+            "ridge": self.ridge,
+            "loop": self.loop.to_dict(),
+            "inner": {"name": self.inner.key, **self.inner.settings()},
+            "tolerance": self.tolerance,
+            "most_passes": self.most_passes,
+        }
+
+    def solve(self, evidence: Evidence) -> Solved:
+        """Return the values of the inner least squares: nothing can be simulated from evidence alone."""
+        return self.inner.solve(evidence)
+
+    def fit_problem(self, problem: Problem) -> Solution:
+        """Return the solution after as many passes as it takes.
+
+        Raises
+        ------
+        ModelError
+            when a term cannot be simulated, or neither least squares nor the nominal robot have a positive definite
+            mass matrix.
+        SimulationError
+            when the closed loop is unstable, or does not follow the measured motion.
+        """
+        check_rows(problem.evidence)
+        runs = simulated_runs(problem, self.loop)
+        tried = self._first(runs)
+        cause, advice, passes = "", "", 0
+        while not cause:
+            passes += 1
+            found = self.improved(runs, tried)
+            before = tried.values
+            try:
+                tried = self._step(runs, tried, found)
+            except (ModelError, SimulationError) as error:
+                cause, advice = f"stopped in pass {passes}: {error.what} ({error.where})", _UNKNOWN_LOOP
+            else:
+                cause, advice = self._reason(passes, torque_change(problem.evidence, tried.values - before, before))
+        return self.solution(runs, tried, found, (passes, cause, advice))
+
+    @abstractmethod
+    def improved(self, runs: SimulatedRuns, tried: Tried) -> Found:
+        """Return what one pass makes of parameters and the motions they cause."""
+
+    @abstractmethod
+    def solution(self, runs: SimulatedRuns, tried: Tried, found: Found, ending: tuple[int, str, str]) -> Solution:
+        """Return the solution after the last pass; `ending` is the number of passes, cause and advice."""
+
+    def accepts(self, runs: SimulatedRuns, before: Tried, after: Tried) -> bool:  # noqa: ARG002
+        """Return whether a step is taken as it is, or halved; every step that can be simulated by default."""
+        return True
+
+    def _first(self, runs: SimulatedRuns) -> Tried:
+        """Return the values of least squares, or the nominal ones where those move no robot."""
+        problem = runs.problem
+        values = self.inner.fit_problem(problem).values
+        try:
+            return tried_in(runs, values)
+        except (ModelError, SimulationError) as error:
+            nominal = problem.base.projection @ _nominal(problem)
+            try:
+                return tried_in(runs, nominal)
+            except (ModelError, SimulationError):
+                raise error from None
+
+    def _step(self, runs: SimulatedRuns, tried: Tried, found: Found) -> Tried:
+        """Return the values found, or as far on the way to them as a robot moves with them."""
+        for halving in range(_HALVINGS + 1):
+            values = tried.values + (found.values - tried.values) / 2**halving
+            try:
+                after = tried_in(runs, values)
+            except (ModelError, SimulationError):
+                if halving == _HALVINGS:
+                    raise
+                continue
+            if self.accepts(runs, tried, after):
+                return after
+        return tried
+
+    def _reason(self, passes: int, moved: float) -> tuple[str, str]:
+        words = f"the last pass moved the torque by {100 * moved:.2g} % of the residual"
+        if moved < self.tolerance:
+            return f"converged after {passes} passes: {words}", ""
+        if passes == self.most_passes:
+            return f"stopped after {passes} passes: {words}", _UNKNOWN_LOOP
+        return "", ""
+
+
+def tried_in(runs: SimulatedRuns, values: FloatArray) -> Tried:
+    """Return the motions of every run with these parameters.
+
+    Raises
+    ------
+    ModelError
+        when the mass matrix is not positive definite.
+    SimulationError
+        when the closed loop is unstable or does not follow the measured motion.
+    """
+    motions = []
+    for run in runs.runs:
+        moved = runs.moved(run, values)
+        runs.check_following(run, moved)
+        motions.append(moved)
+    return Tried(values, tuple(motions))
+
+
+def merged_evidence(runs: SimulatedRuns, pieces: Iterable[Rows]) -> Evidence:
+    """Return the evidence of one piece of rows a recording."""
+    parts = (
+        evidence_from_rows(runs.layout, runs.problem.base, (piece,), name=run.name)
+        for run, piece in zip(runs.runs, pieces, strict=True)
+    )
+    return reduce(Evidence.merged, parts)
+
+
+def torque_change(evidence: Evidence, change: FloatArray, values: FloatArray) -> float:
+    """Return by how much a change of the parameters moves the predicted torque, over the residual.
+
+    Each joint counts by its own residual.
+    """
+    residual = np.maximum(joint_residuals(evidence, values), np.finfo(float).tiny)
+    squares = [
+        np.sum((factor[:, :-1] @ change[support]) ** 2)
+        for support, factor in zip(evidence.supports, evidence.total.factors, strict=True)
+    ]
+    return float(np.sqrt(np.mean(np.array(squares) / evidence.n_t / residual**2)))
+
+
+def _nominal(problem: Problem) -> FloatArray:
+    """Return the robot's nominal standard parameters, (n_p,), without friction."""
+    masses = nominal_masses(problem.model.robot)
+    standard = np.zeros(problem.model.n_p)
+    for index, parameter in enumerate(problem.model.parameters):
+        if parameter.symbol in INERTIAL_SYMBOLS:
+            standard[index] = masses.inertia[parameter.joint, INERTIAL_SYMBOLS.index(parameter.symbol)]
+        elif parameter.symbol == "Ia":
+            standard[index] = masses.rotor[parameter.joint]
+    return standard
