@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from sample_arms import planar_truth
 from tauhat.dynamics import base_parameters
 from tauhat.estimation import Estimator, Solution, collect_all
 from tauhat.estimation.problem import Problem
+from tauhat.estimation.repeated_rows import remembered
 from tauhat.recordings import Recording
 from tauhat.recordings.processing import Processing
 
@@ -51,6 +53,21 @@ def problem_of(recordings: Recording | Sequence[Recording]) -> Problem:
     logs = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     evidence = collect_all(TRUTH.model, BASE, logs, SETTINGS)
     return Problem(model=TRUTH.model, base=BASE, recordings=logs, processing=SETTINGS, evidence=evidence)
+
+
+@cache
+def clean(seed: int) -> Problem:
+    return remembered(problem_of(run(seed)))
+
+
+@cache
+def spiky(seed: int) -> Problem:
+    return problem_of(with_spikes(run(seed), seed))
+
+
+@cache
+def touched(seed: int) -> Problem:
+    return remembered(problem_of(with_touches(run(seed), seed)))
 
 
 def fitted(method: Estimator, recordings: Recording | Sequence[Recording]) -> Solution:

@@ -170,7 +170,7 @@ def test_rounding_errors_of_a_constant_position_determine_nothing():
 def test_estimators_go_by_their_names():
     assert estimator_named("ols") == OrdinaryLeastSquares()
     assert estimator_named("wls") == WeightedLeastSquares()
-    with pytest.raises(ModelError, match="unknown estimator; expected ols, wls, .*irls.*, got lasso"):
+    with pytest.raises(ModelError, match=r"unknown estimator; expected ols, wls, .*irls.*, got lasso"):
         estimator_named("lasso")
 
 

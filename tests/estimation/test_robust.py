@@ -6,10 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
-from scipy.optimize import least_squares, minimize
-
-from rough_logs import BASE, EXPECTED, TRUTH, covered, fitted, problem_of, run, torque_error, with_spikes, with_touches
+from rough_logs import (
+    BASE,
+    EXPECTED,
+    SETTINGS,
+    TRUTH,
+    clean,
+    covered,
+    fitted,
+    problem_of,
+    run,
+    spiky,
+    torque_error,
+    touched,
+    with_spikes,
+    with_touches,
+)
 from tauhat.errors import ModelError
 from tauhat.estimation import (
     BisquareLeastSquares,
@@ -19,12 +31,10 @@ from tauhat.estimation import (
     PhysicalConstraints,
     WeightedLeastSquares,
     identify,
-    repeated_rows,
 )
 from tauhat.estimation.losses import Bisquare, Cauchy, Huber
-from tauhat.estimation.repeated_rows import remembered
+from tauhat.estimation.repeated_rows import remembered, repeated_rows
 from tauhat.estimation.robust import joint_scales
-from rough_logs import SETTINGS
 
 LOSSES = [Huber(), Bisquare(), Cauchy(), Huber(threshold=0.7), Bisquare(threshold=2.0), Cauchy(threshold=4.0)]
 METHODS = [HuberLeastSquares(), BisquareLeastSquares(), CauchyLeastSquares()]
@@ -64,7 +74,7 @@ def test_the_solution_minimises_the_sum_of_losses(method):
 
     def objective(values: np.ndarray) -> float:
         parts = [
-            np.sum(found.scales**2 / found.scales * method.loss.loss((rows.residuals(piece, values).T / found.scales)))
+            np.sum(found.scales**2 / found.scales * method.loss.loss(rows.residuals(piece, values).T / found.scales))
             for piece in rows
         ]
         return float(sum(parts))
@@ -75,25 +85,24 @@ def test_the_solution_minimises_the_sum_of_losses(method):
     assert objective(found.values + 0.02 * np.abs(EXPECTED)) > least * (1.0 + 1e-4)
 
 
-@pytest.mark.parametrize("disturbed", [with_spikes, with_touches])
+@pytest.mark.parametrize("disturbed", [spiky, touched])
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.key)
 def test_five_percent_of_gross_outliers_cost_less_than_half_as_much_again(method, disturbed):
-    clean, rough, plain = [], [], []
-    for seed in range(20):
-        recording = run(seed)
-        problem, spoilt = problem_of(recording), problem_of(disturbed(recording, seed))
-        clean.append(torque_error(method.fit_problem(problem).values, problem))
+    without, rough, plain = [], [], []
+    for seed in range(8):
+        problem, spoilt = clean(seed), disturbed(seed)
+        without.append(torque_error(method.fit_problem(problem).values, problem))
         rough.append(torque_error(method.fit_problem(spoilt).values, problem))
         plain.append(torque_error(OrdinaryLeastSquares().fit_problem(spoilt).values, problem))
-    assert np.median(rough) < 1.5 * np.median(clean)
-    assert np.median(plain) > 4.0 * np.median(clean)
+    assert np.median(rough) < 1.5 * np.median(without)
+    assert np.median(plain) > 4.0 * np.median(without)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.key)
 def test_without_outliers_little_is_lost_and_nothing_is_biased(method):
     errors, best = [], []
-    for seed in range(24):
-        problem = problem_of(run(seed))
+    for seed in range(16):
+        problem = clean(seed)
         errors.append(method.fit_problem(problem).values - EXPECTED)
         best.append(WeightedLeastSquares().fit(problem.evidence).values - EXPECTED)
     spread = np.std(errors, axis=0, ddof=1)
@@ -103,9 +112,9 @@ def test_without_outliers_little_is_lost_and_nothing_is_biased(method):
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.key)
-@pytest.mark.parametrize("disturbed", [lambda log, _: log, with_touches], ids=["clean", "touched"])
+@pytest.mark.parametrize("disturbed", [clean, touched])
 def test_95_percent_intervals_cover_the_truth(method, disturbed):
-    hits = [covered(fitted(method, disturbed(run(seed), seed))) for seed in range(30)]
+    hits = [covered(method.fit_problem(disturbed(seed))) for seed in range(16)]
     assert 0.90 <= np.mean(hits) <= 0.997
     assert np.mean(hits, axis=0).min() >= 0.7
 
@@ -184,7 +193,7 @@ def test_settings_out_of_range_are_refused(settings, message):
 
 
 def test_a_threshold_must_be_positive():
-    with pytest.raises(ModelError, match="threshold of a loss must be positive, got 0|threshold of a loss"):
+    with pytest.raises(ModelError, match="threshold of a loss must be positive; got 0"):
         Huber(threshold=0.0)
 
 

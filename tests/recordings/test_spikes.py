@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sample_arms import planar_truth
-from tauhat.recordings.spikes import WINDOW, without_spikes
+from tauhat.recordings.spikes import without_spikes
 
 RECORDING = planar_truth().recording(seconds=10.0, noise=0.2 * np.random.default_rng(0).normal(size=(2000, 2)))
 
@@ -35,7 +35,5 @@ def test_a_torque_that_stands_still_most_of_the_time_has_no_spike_where_it_moves
     assert without_spikes(flat, threshold=8.0).share == 0.0
 
 
-def test_what_cannot_have_spikes_is_left_alone():
+def test_a_recording_without_torque_has_no_spikes():
     assert without_spikes(replace(RECORDING, tau=None), threshold=8.0).recording.tau is None
-    short = RECORDING.rows(0, WINDOW - 1) if WINDOW > 10 else RECORDING.rows(0, 12)
-    assert without_spikes(short, threshold=8.0).share == 0.0

@@ -7,13 +7,15 @@ solves for the change of speed d, implicitly in what is stiff; second order wher
     (M + h/2 (kd + c) + h^2/4 (kp + k)) d = h (tau(q, v) - bias(q, v) - passive(q, v) + (kd + c) (v - u))
     dq = u + d/2     ddq = d/h     u+ = u + d     q+ = q + h u+
 c and k are the secant damping and the bristles' stiffness of `passive_kernel`: however sharp friction is, it neither
-overshoots nor diverges. A joint whose torque is at its limit takes no part of kp and kd.
+overshoots nor diverges. A joint whose torque is held or at its limit takes no part of kp and kd.
+Where a held torque changes, the step around that time takes the mean of both.
 
 `runge_kutta_kernel` is the classical method of fourth order, explicit: for smooth friction, and to check the other.
 
 Arguments in tuples: `body` geometry, inertia (n_v, 10), rotor (n_v,); `passive` kinds, joints, shapes, weights of the
 elements; `law` kp, kd, ki, limit (n_v,); `reference` q, dq, ff (n_t, n_v), on straight lines between the samples;
-`start` q, dq (2, n_v). Filled: `out` (4, n_v, n_t) with q, dq, ddq, tau at every sample. Returned: (code, sample, joint).
+`start` q, dq (2, n_v); `times` the step between samples, the steps of the integrator in it, and for how many of
+these the controller holds a torque, as sampled controllers do (0: it acts all the time). Filled: `out` (4, n_v, n_t) with q, dq, ddq, tau at every sample. Returned: (code, sample, joint).
 The integral stops while the torque is at its limit and the error would drive it further.
 
 Source: Hairer, Lubich, Wanner, "Geometric numerical integration", 2006 (leapfrog); Newmark 1959 (the h^2/4 term).
@@ -32,14 +34,16 @@ RUNAWAY = 1e3  # [rad/s or m/s] no robot moves this fast
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def leapfrog_kernel(body, passive, law, reference, start, step, substeps, out):  # type: ignore[no-untyped-def]
-    """Simulate by leapfrog steps of `step / substeps`; see the head of this file."""
+def leapfrog_kernel(body, passive, law, reference, start, times, out):  # type: ignore[no-untyped-def]
+    """Simulate by leapfrog steps; see the head of this file."""
+    step, substeps, hold = times
     kp, kd, ki, limit = law
     q_ref, dq_ref, ff = reference
     n_t, n_v = q_ref.shape
     h = step / substeps
     q, u = start[0].copy(), start[1].copy()
     v, a, d, tau, keep, integral, moved, load = np.zeros((8, n_v))
+    held, before = np.zeros((2, n_v))
     bias, taken, damping, stiffness = np.zeros((4, n_v))
     free = np.ones(n_v)
     bent = np.zeros(passive[0].size)
@@ -58,13 +62,20 @@ def leapfrog_kernel(body, passive, law, reference, start, step, substeps, out): 
                 if failed >= 0:
                     return NO_BODY, k, failed
             passive_kernel(*passive, q, v, load, bent, taken, damping, stiffness)
+            steers = hold == 0 or (k * substeps + s) % hold == 0
             for j in range(n_v):
-                e = q_ref[k, j] + part * (q_ref[after, j] - q_ref[k, j]) - q[j]
-                de = dq_ref[k, j] + part * (dq_ref[after, j] - dq_ref[k, j]) - v[j]
-                ahead = ff[k, j] + part * (ff[after, j] - ff[k, j])
-                tau[j], free[j] = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * integral[j], limit[j])
-                if free[j] > 0.0 or tau[j] * e < 0.0:
-                    integral[j] += h * e
+                if steers:
+                    e = q_ref[k, j] + part * (q_ref[after, j] - q_ref[k, j]) - q[j]
+                    de = dq_ref[k, j] + part * (dq_ref[after, j] - dq_ref[k, j]) - v[j]
+                    ahead = ff[k, j] + part * (ff[after, j] - ff[k, j])
+                    tau[j], free[j] = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * integral[j], limit[j])
+                    if free[j] > 0.0 or tau[j] * e < 0.0:
+                        integral[j] += h * max(hold, 1) * e
+                    if hold > 0:
+                        free[j], held[j], before[j] = 0.0, tau[j], held[j]
+                        tau[j] = 0.5 * (before[j] + held[j]) if turn > 0 or s > 0 else held[j]
+                elif hold > 0:
+                    tau[j] = held[j]
                 keep[j] = free[j] * kd[j] + damping[j]
                 mass[j, j] += 0.5 * h * keep[j] + 0.25 * h * h * (free[j] * kp[j] + stiffness[j])
                 d[j] = h * (tau[j] - bias[j] - taken[j] + keep[j] * (v[j] - u[j]))
@@ -90,8 +101,9 @@ def leapfrog_kernel(body, passive, law, reference, start, step, substeps, out): 
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def runge_kutta_kernel(body, passive, law, reference, start, step, substeps, out):  # type: ignore[no-untyped-def]
-    """Simulate by Runge-Kutta steps of `step / substeps`; see the head of this file."""
+def runge_kutta_kernel(body, passive, law, reference, start, times, out):  # type: ignore[no-untyped-def]
+    """Simulate by Runge-Kutta steps; see the head of this file."""
+    step, substeps, hold = times
     n_t, n_v = reference[0].shape
     h = step / substeps
     state, stage = np.zeros((3, n_v)), np.zeros((3, n_v))  # q, dq, integral
@@ -115,7 +127,8 @@ def runge_kutta_kernel(body, passive, law, reference, start, step, substeps, out
                 _bend(passive, moved, bending)
                 _mass_and_load(body, stage[0], stage[1], a, work, rows[0], mass, load)
                 passive_kernel(*passive, stage[0], stage[1], load, bending, rows[1], rows[2], rows[3])
-                _law_torque(law, reference, k, (s + ahead) / substeps, stage, tau, rate)
+                if hold == 0 or (place == 0 and (k * substeps + s) % hold == 0):
+                    _law_torque(law, reference, k, (s + ahead) / substeps, stage, tau, rate)
                 for j in range(n_v):
                     rate[0, j] = stage[1, j]
                     rate[1, j] = tau[j] - rows[0, j] - rows[1, j]

@@ -75,10 +75,17 @@ class Followed(NamedTuple):
 
 
 class Stepping(NamedTuple):
-    """How a motion is integrated: time between the samples [s], steps in between, and by which method."""
+    """How a motion is integrated.
+
+    step : time between the samples [s]
+    substeps : of the integrator in it
+    hold : of these, for which the controller holds its torque; 0: it acts all the time
+    integrator : the method
+    """
 
     step: float
     substeps: int = 1
+    hold: int = 0
     integrator: Integrator = "leapfrog"
 
 
@@ -202,9 +209,7 @@ def follow(
     masses = arm.masses(standard)
     body = (*kernel_tree(arm.model.robot).geometry, *masses)
     kernel: Callable[..., tuple[int, int, int]] = _KERNELS[stepping.integrator]
-    code, sample, joint = kernel(
-        body, arm.passive(standard), tuple(gains), tuple(reference), start, stepping.step, stepping.substeps, out
-    )
+    code, sample, joint = kernel(body, arm.passive(standard), tuple(gains), tuple(reference), start, stepping[:3], out)
     where = f"t = {sample * stepping.step:.4g} s"
     if code == NO_BODY:
         raise not_a_body(arm.model.robot, joint, where)

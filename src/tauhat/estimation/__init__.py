@@ -5,8 +5,11 @@ from tauhat.estimation.essential import EssentialLeastSquares, EssentialParamete
 from tauhat.estimation.estimate import Estimate, InputLog, ParameterRow, load_estimate
 from tauhat.estimation.estimators import ESTIMATORS, estimator_named
 from tauhat.estimation.evidence import Evidence, collect, collect_all
+from tauhat.estimation.hybrid import HybridLeastSquares
 from tauhat.estimation.identify import identify
 from tauhat.estimation.least_squares import Estimator, OrdinaryLeastSquares, WeightedLeastSquares
+from tauhat.estimation.losses import Bisquare, Cauchy, Huber, Loss
+from tauhat.estimation.maximum_likelihood import MaximumLikelihood
 from tauhat.estimation.payload import KnownPayload, Payload, identify_payload
 from tauhat.estimation.payload_body import Body
 from tauhat.estimation.physical import ConsistentSolution, consistent
@@ -18,13 +21,23 @@ from tauhat.estimation.physical_constraints import (
     LinkConstraints,
     PhysicalConstraints,
 )
+from tauhat.estimation.prior import PriorLeastSquares, RidgeLeastSquares
+from tauhat.estimation.recursive import RecursiveLeastSquares
+from tauhat.estimation.residual_learning import LearnedResidual, NetworkSettings, learn_residual, unseen_error
+from tauhat.estimation.residual_network import ResidualNetwork
+from tauhat.estimation.robust import BisquareLeastSquares, CauchyLeastSquares, HuberLeastSquares
 from tauhat.estimation.solution import Solution
 from tauhat.estimation.structure import Structure, Trial, select_model
+from tauhat.estimation.total_least_squares import TotalLeastSquares
 
 __all__ = [
     "ESTIMATORS",
+    "Bisquare",
+    "BisquareLeastSquares",
     "Body",
     "Box",
+    "Cauchy",
+    "CauchyLeastSquares",
     "ConsistentSolution",
     "DriveCalibration",
     "DriveGains",
@@ -37,15 +50,27 @@ __all__ = [
     "Estimator",
     "Evidence",
     "GaussianPull",
+    "Huber",
+    "HuberLeastSquares",
+    "HybridLeastSquares",
     "InputLog",
     "KnownPayload",
+    "LearnedResidual",
     "LinkConstraints",
+    "Loss",
+    "MaximumLikelihood",
+    "NetworkSettings",
     "OrdinaryLeastSquares",
     "ParameterRow",
     "Payload",
     "PhysicalConstraints",
+    "PriorLeastSquares",
+    "RecursiveLeastSquares",
+    "ResidualNetwork",
+    "RidgeLeastSquares",
     "Solution",
     "Structure",
+    "TotalLeastSquares",
     "Trial",
     "WeighedPayload",
     "WeightedLeastSquares",
@@ -57,6 +82,8 @@ __all__ = [
     "estimator_named",
     "identify",
     "identify_payload",
+    "learn_residual",
     "load_estimate",
     "select_model",
+    "unseen_error",
 ]

@@ -11,7 +11,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, frozen
 from tauhat.control.laws import PDGravity, TrackingLaw
 from tauhat.dynamics.forward import Masses, rotor_mass_matrix
-from tauhat.dynamics.simulated_arm import Integrator
+from tauhat.dynamics.simulated_arm import Integrator, Stepping
 from tauhat.errors import ModelError
 from tauhat.robots.robot import Robot
 
@@ -87,21 +87,23 @@ class ClosedLoop:
         every set of parameters, so that the closed loop stays the same
     bandwidth : of the tuned law [Hz]
     references : one a recording, in its time; empty: the measured position, low-passed at `reference_cutoff`
-    reference_cutoff : [Hz], that of the processing where it is None
-    substeps : integration steps between two samples
+    reference_cutoff : [Hz]; that of the processing where it is lower
+    control_rate : at which the controller computes a torque and holds it [Hz]; None: all the time
+    substeps : integration steps between two samples, or two torques of the controller where these are more often
     integrator : "leapfrog", or "runge-kutta" for smooth friction
     """
 
     law: TrackingLaw | None = None
     bandwidth: float = 10.0
     references: Sequence[Reference] = ()
-    reference_cutoff: float | None = None
+    reference_cutoff: float = 10.0
+    control_rate: float | None = None
     substeps: int = 1
     integrator: Integrator = "leapfrog"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "references", tuple(self.references))
-        for name in ("bandwidth", "reference_cutoff"):
+        for name in ("bandwidth", "reference_cutoff", "control_rate"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
                 raise ModelError(f"closed loop: {name} must be a positive frequency", got=f"{value} Hz")
@@ -109,6 +111,15 @@ class ClosedLoop:
             raise ModelError("closed loop: at least one step a sample is needed", got=self.substeps)
         if self.integrator not in {"leapfrog", "runge-kutta"}:
             raise ModelError("closed loop: unknown integrator", expected="leapfrog or runge-kutta", got=self.integrator)
+
+    def stepping(self, step: float) -> Stepping:
+        """Return how a log with this step between its samples [s] is simulated; a held torque lasts whole steps."""
+        if self.control_rate is None:
+            return Stepping(step, self.substeps, 0, self.integrator)
+        torques = step * self.control_rate  # of the controller in a sample
+        if torques >= 1.0:
+            return Stepping(step, round(torques) * self.substeps, self.substeps, self.integrator)
+        return Stepping(step, self.substeps, round(self.substeps / torques), self.integrator)
 
     def law_for(self, robot: Robot, masses: Masses, q: FloatArray) -> TrackingLaw:
         """Return the law, tuned to these masses along the motion q (n_t, n_v) where none is given.
@@ -141,6 +152,7 @@ class ClosedLoop:
             "bandwidth": None if law else self.bandwidth,
             "references": [type(reference).__name__ for reference in self.references] or "measured",
             "reference_cutoff": self.reference_cutoff,
+            "control_rate": self.control_rate,
             "substeps": self.substeps,
             "integrator": self.integrator,
         }

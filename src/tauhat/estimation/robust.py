@@ -8,7 +8,7 @@ Spikes of single samples are mended before the low-pass, which would smear each 
 
 Error bars: the block jackknife on the weighted evidence moves the solution as if the weights were fixed. They are not:
 a residual beyond the threshold that grows, loses weight. The fit is held by `rho''`, not by `w`, and the error bars are
-wider by that ratio (the sandwich formula with `rho''` in the outer factors).
+wider by that ratio (the sandwich formula with `rho''` in the outer factors, and `psi^2` between them).
 
 Source: Huber, Ronchetti, "Robust statistics", 2009, ch. 7; Street, Carroll, Ruppert, "A note on computing robust
 regression estimates via iteratively reweighted least squares", 1988 (covariance).
@@ -157,19 +157,25 @@ class ReweightedLeastSquares(Estimator, ABC):
         return Reweighted(found, scales, evidence, passes + 1, moved)
 
     def _covariance(self, rows: RepeatedRows, found: Reweighted) -> FloatArray:
-        weights = found.scales**-self.power
-        covariance = honest_covariance(found.evidence, weights, found.values, ridge=self.ridge)
-        held = np.maximum(self._bends(rows, found), _LEAST_BEND)
-        return covariance * np.outer(*2 * [_widening(found.evidence, weights, held)])
+        weights, evidence = found.scales**-self.power, found.evidence
+        bend, force = self._moments(rows, found)
+        freedom = evidence.n_v * evidence.n_t
+        variance = float(np.mean((weights * found.scales) ** 2 * force)) * freedom / max(1, freedom - evidence.n_b)
+        covariance = honest_covariance(evidence, weights, found.values, ridge=self.ridge, variance=variance)
+        wider = _widening(evidence, weights, np.maximum(bend, _LEAST_BEND))
+        return covariance * np.outer(wider, wider)
 
-    def _bends(self, rows: RepeatedRows, found: Reweighted) -> FloatArray:
-        """Return the mean of rho'' over the mean of the weights, joint by joint, (n_v,)."""
-        bend, weight = np.zeros_like(found.scales), np.zeros_like(found.scales)
+    def _moments(self, rows: RepeatedRows, found: Reweighted) -> tuple[FloatArray, FloatArray]:
+        """Return the means of rho'' and of psi^2 over the mean of the weights, joint by joint, (n_v,) each."""
+        bend, force, weight = (np.zeros_like(found.scales) for _ in range(3))
         for piece in rows:
             scaled = rows.residuals(piece, found.values) / found.scales[:, None]
+            own = self.loss.weight(scaled)
             bend += self.loss.bend(scaled).sum(axis=1)
-            weight += self.loss.weight(scaled).sum(axis=1)
-        return np.asarray(bend / np.maximum(weight, np.finfo(float).tiny))
+            force += np.sum((own * scaled) ** 2, axis=1)
+            weight += own.sum(axis=1)
+        least = np.maximum(weight, np.finfo(float).tiny)
+        return bend / least, force / least
 
     def _cause(self, found: Reweighted) -> str:
         ended = "converged" if found.moved <= self.tolerance else f"stopped after {found.passes} passes"

@@ -14,7 +14,7 @@ from tauhat.dynamics.forward import Masses, nominal_masses
 from tauhat.dynamics.model import Layout
 from tauhat.dynamics.motion import motion_from_rows
 from tauhat.dynamics.rigid_body import gravity_torque
-from tauhat.dynamics.simulated_arm import Followed, Gains, Moved, SimulatedArm, Stepping, follow, simulated_arm
+from tauhat.dynamics.simulated_arm import Followed, Gains, Moved, SimulatedArm, follow, simulated_arm
 from tauhat.errors import ModelError, SimulationError
 from tauhat.estimation.closed_loop import ClosedLoop
 from tauhat.estimation.problem import Problem
@@ -109,7 +109,7 @@ class SimulatedRuns:
             when a joint runs away.
         """
         gains, followed = controller or self.controller(run, values)
-        stepping = Stepping(run.step, self.loop.substeps, self.loop.integrator)
+        stepping = self.loop.stepping(run.step)
         return follow(self.arm, self.standard(values), followed, gains=gains, start=run.start, stepping=stepping)
 
     def _feedforward(self, run: Run, kind: Feedforward, *, masses: Masses, standard: FloatArray) -> FloatArray:
@@ -194,7 +194,7 @@ def _run(problem: Problem, recording: Recording, loop: ClosedLoop, *, number: in
             )
     else:
         smooth = whole
-        if loop.reference_cutoff is not None and loop.reference_cutoff < processing.motion_cutoff:
+        if loop.reference_cutoff < processing.motion_cutoff:
             slower = replace(processing, motion_cutoff=loop.reference_cutoff)
             smooth = _joined_stretches(list(stretches(recording, slower)))
         q_ref, dq_ref, ddq_ref = (np.ascontiguousarray(signal.T) for signal in (smooth.q, smooth.dq, smooth.ddq))

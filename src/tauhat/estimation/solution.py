@@ -150,16 +150,24 @@ def joint_torques(evidence: Evidence) -> FloatArray:
     return np.sqrt(np.array(squares) / evidence.n_t)
 
 
-def honest_covariance(evidence: Evidence, weights: FloatArray, values: FloatArray, *, ridge: float) -> FloatArray:
-    """Return the covariance of the parameters, (n_b, n_b); see the head of this file."""
+def honest_covariance(
+    evidence: Evidence, weights: FloatArray, values: FloatArray, *, ridge: float, variance: float | None = None
+) -> FloatArray:
+    """Return the covariance of the parameters, (n_b, n_b); see the head of this file.
+
+    Parameters
+    ----------
+    variance : of the weighted residuals; the evidence's own by default
+    """
     matrix, rhs = stacked(evidence, evidence.total, weights)
     scale = np.linalg.norm(matrix, axis=0)
     _, singular, right = np.linalg.svd(np.linalg.qr(matrix / scale, mode="r"), full_matrices=False)
     damped = np.sqrt(singular**2 + ridge**2)
     damped = np.maximum(damped, RANK * damped[0])
     root = right.T / damped  # A'A = S (root root')^-1 S with the column scales S
-    rows = evidence.n_v * evidence.n_t
-    variance = np.sum((matrix @ values - rhs) ** 2) / max(1, rows - evidence.n_b)
+    if variance is None:
+        freedom = max(1, evidence.n_v * evidence.n_t - evidence.n_b)
+        variance = float(np.sum((matrix @ values - rhs) ** 2)) / freedom
     white = variance * (root @ root.T) / np.outer(scale, scale)
     groups = time_groups(evidence)
     if len(groups) == 1:

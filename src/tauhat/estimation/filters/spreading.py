@@ -50,6 +50,10 @@ class Spreading(ABC):
         root : (n_x, n_x) S of the covariance `S S'`
         """
 
+    @abstractmethod
+    def narrower(self) -> Spreading:
+        """Return the same way with points half as far from the mean."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Extended(Spreading):
@@ -65,6 +69,10 @@ class Extended(Spreading):
         values = function(np.vstack([mean, mean + moved, mean - moved]))
         up, down = values[1 : 1 + mean.size], values[1 + mean.size :]
         return Spread(values[0], (up - down).T / (2.0 * _SLOPE), root)
+
+    def narrower(self) -> Spreading:
+        """Return itself: its points are close as they are."""
+        return self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,19 +100,24 @@ class Unscented(Spreading):
         weight = 0.5 / self.reach**2
         return Spread(values[0] + weight * away.sum(axis=0), np.sqrt(weight) * away.T, np.sqrt(weight) * moved.T)
 
+    def narrower(self) -> Spreading:
+        """Return the points at half the reach."""
+        return Unscented(reach=0.5 * self.reach)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CentralDifference(Spreading):
     """By divided differences of first and second order, which see slope and curvature.
 
-    step : of the differences [standard deviations]; sqrt(3) matches the fourth moment of a Gaussian
+    step : of the differences [standard deviations]; sqrt(3) matches the fourth moment of a Gaussian. Below one the
+        curvature is in the mean alone
     """
 
     step: float = 3.0**0.5
 
     def __post_init__(self) -> None:
-        if not self.step >= 1.0:
-            raise ModelError("step of the central differences", expected="at least 1", got=self.step)
+        if not 0.0 < self.step < np.inf:
+            raise ModelError("step of the central differences", expected="a positive number", got=self.step)
 
     def through(self, function: BatchFunction, mean: FloatArray, root: FloatArray) -> Spread:
         """Return the mean corrected for curvature, and the columns of slope and curvature."""
@@ -113,6 +126,10 @@ class CentralDifference(Spreading):
         middle, up, down = values[0], values[1 : 1 + n], values[1 + n :]
         bend = up + down - 2.0 * middle
         slopes = (up - down).T / (2.0 * h)
-        bends = np.sqrt(h**2 - 1.0) / (2.0 * h**2) * bend.T
+        bends = np.sqrt(max(h**2 - 1.0, 0.0)) / (2.0 * h**2) * bend.T
         argument = np.hstack([root, np.zeros_like(root)])
         return Spread(middle + bend.sum(axis=0) / (2.0 * h**2), np.hstack([slopes, bends]), argument)
+
+    def narrower(self) -> Spreading:
+        """Return the differences over half the step."""
+        return CentralDifference(step=0.5 * self.step)

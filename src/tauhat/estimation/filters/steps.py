@@ -10,7 +10,9 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError
 from tauhat.estimation.filters.forms import CovarianceForm, PlainCovariance
-from tauhat.estimation.filters.spreading import BatchFunction, Extended, Spreading
+from tauhat.estimation.filters.spreading import BatchFunction, Extended, Spread, Spreading
+
+_NARROWED = 5  # times that points without a mass matrix are drawn nearer to the mean
 
 
 class Belief(NamedTuple):
@@ -48,8 +50,18 @@ class KalmanFilter:
 
     def predict(self, belief: Belief, transition: BatchFunction, noise: FloatArray) -> Belief:
         """Return the belief one step on: through `transition`, then with `noise` (n_x, k), columns of `N N'`."""
-        spread = self.spreading.through(transition, belief.mean, self.form.root(belief.kept))
+        spread = self._spread(transition, belief.mean, self.form.root(belief.kept))
         return Belief(spread.mean, self.form.predicted(spread.value, noise))
+
+    def _spread(self, transition: BatchFunction, mean: FloatArray, root: FloatArray) -> Spread:
+        """Return the Gaussian behind `transition`, with points drawn in while one of them is no robot."""
+        spreading = self.spreading
+        for _ in range(_NARROWED):
+            try:
+                return spreading.through(transition, mean, root)
+            except np.linalg.LinAlgError:
+                spreading = spreading.narrower()
+        return spreading.through(transition, mean, root)
 
     def correct(
         self, belief: Belief, measure: BatchFunction, measured: FloatArray, noise: FloatArray
