@@ -22,6 +22,9 @@ from rough_logs import (
     with_spikes,
     with_touches,
 )
+from scipy.integrate import quad
+from scipy.optimize import least_squares, minimize
+
 from tauhat.errors import ModelError
 from tauhat.estimation import (
     BisquareLeastSquares,

@@ -89,37 +89,42 @@ class ClosedLoop:
     references : one a recording, in its time; empty: the measured position, low-passed at `reference_cutoff`
     reference_cutoff : [Hz]; that of the processing where it is lower
     control_rate : at which the controller computes a torque and holds it [Hz]; None: all the time
-    substeps : integration steps between two samples, or two torques of the controller where these are more often
+    longest_step : of the integrator [s]; a step between two samples, or two torques, is cut into equal ones below it
     integrator : "leapfrog", or "runge-kutta" for smooth friction
     """
 
     law: TrackingLaw | None = None
-    bandwidth: float = 10.0
+    bandwidth: float = 20.0
     references: Sequence[Reference] = ()
     reference_cutoff: float = 10.0
     control_rate: float | None = None
-    substeps: int = 1
+    longest_step: float = 1e-3
     integrator: Integrator = "leapfrog"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "references", tuple(self.references))
-        for name in ("bandwidth", "reference_cutoff", "control_rate"):
+        for name in ("bandwidth", "reference_cutoff", "control_rate", "longest_step"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
-                raise ModelError(f"closed loop: {name} must be a positive frequency", got=f"{value} Hz")
-        if self.substeps < 1:
-            raise ModelError("closed loop: at least one step a sample is needed", got=self.substeps)
+                raise ModelError(f"closed loop: {name} must be positive", got=value)
         if self.integrator not in {"leapfrog", "runge-kutta"}:
             raise ModelError("closed loop: unknown integrator", expected="leapfrog or runge-kutta", got=self.integrator)
+
+    @property
+    def known(self) -> bool:
+        """Whether law and references are the robot's own."""
+        return self.law is not None and bool(self.references)
 
     def stepping(self, step: float) -> Stepping:
         """Return how a log with this step between its samples [s] is simulated; a held torque lasts whole steps."""
         if self.control_rate is None:
-            return Stepping(step, self.substeps, 0, self.integrator)
+            return Stepping(step, _cut(step, self.longest_step), 0, self.integrator)
         torques = step * self.control_rate  # of the controller in a sample
         if torques >= 1.0:
-            return Stepping(step, round(torques) * self.substeps, self.substeps, self.integrator)
-        return Stepping(step, self.substeps, round(self.substeps / torques), self.integrator)
+            hold = _cut(step / round(torques), self.longest_step)
+            return Stepping(step, round(torques) * hold, hold, self.integrator)
+        substeps = _cut(step, self.longest_step)
+        return Stepping(step, substeps, round(substeps / torques), self.integrator)
 
     def law_for(self, robot: Robot, masses: Masses, q: FloatArray) -> TrackingLaw:
         """Return the law, tuned to these masses along the motion q (n_t, n_v) where none is given.
@@ -153,6 +158,11 @@ class ClosedLoop:
             "references": [type(reference).__name__ for reference in self.references] or "measured",
             "reference_cutoff": self.reference_cutoff,
             "control_rate": self.control_rate,
-            "substeps": self.substeps,
+            "longest_step": self.longest_step,
             "integrator": self.integrator,
         }
+
+
+def _cut(step: float, longest: float) -> int:
+    """Return into how many equal parts, none above the longest, a step is cut."""
+    return max(1, int(np.ceil(step / longest - 1e-6)))

@@ -21,7 +21,7 @@ from tauhat.estimation.elastic_kernel import elastic_kernel
 from tauhat.robots.robot import Robot
 
 _NUDGE = 1e-5  # [rad or m] over which the slope of gravity is taken
-_SUBSTEP = 0.25  # largest change of dry friction per substep, in parts of what would turn it over
+_SUBSTEP = 0.05  # largest change of dry friction per substep, in parts of what would turn it over
 _MOST_SUBSTEPS = 200
 
 

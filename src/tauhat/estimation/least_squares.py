@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence
 from tauhat.estimation.problem import Problem
+from tauhat.estimation.shape_uncertainty import covariance_with_shapes
 from tauhat.estimation.solution import (
     Solution,
     honest_covariance,
@@ -102,7 +103,17 @@ def degrees_of_freedom(evidence: Evidence) -> int:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OrdinaryLeastSquares(Estimator):
+class LeastSquares(Estimator):
+    """Least squares on evidence whose error bars know that shapes of terms were chosen on it, too."""
+
+    def fit_problem(self, problem: Problem) -> Solution:
+        """Return the solution with the shapes among the unknowns of its covariance."""
+        solution = self.fit(problem.evidence)
+        return replace(solution, covariance=covariance_with_shapes(problem, solution, ridge=self.ridge))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrdinaryLeastSquares(LeastSquares):
     """Every joint's equation counts alike, in newton metres.
 
     Source: Khalil, Dombre, "Modeling, identification and control of robots", 2002, ch. 12.
@@ -117,7 +128,7 @@ class OrdinaryLeastSquares(Estimator):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WeightedLeastSquares(Estimator):
+class WeightedLeastSquares(LeastSquares):
     """Each joint's equation is divided by the size of its own residual, to a power, and solved again.
 
     power : 1 makes every joint matter alike relative to its noise (the textbook's choice); 0.5 is between that and

@@ -28,6 +28,7 @@ from tauhat.dynamics.simulated_arm import Moved
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence, evidence_from_rows
 from tauhat.estimation.least_squares import WeightedLeastSquares, degrees_of_freedom
+from tauhat.estimation.problem import Problem
 from tauhat.estimation.rows import Rows
 from tauhat.estimation.simulated_runs import Run, SimulatedRuns
 from tauhat.estimation.simulating import Found, SimulationEstimator, Tried
@@ -145,12 +146,29 @@ class OutputError(SimulationEstimator):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClosedLoopOutputError(OutputError):
-    """The simulated position comes nearest to the measured one; needs the true law, gains and reference.
+    """The simulated position comes nearest to the measured one; only with the robot's own law, gains and reference.
+
+    A law tuned to the parameters, or a reference made of the measured position, is followed by any parameters.
 
     Source: Landau 1997; Gautier, Janot, Vandanjon 2013.
     """
 
     key: ClassVar[str] = "cloe"
+
+    def fit_problem(self, problem: Problem) -> Solution:
+        """Return the solution.
+
+        Raises
+        ------
+        ModelError
+            when law or reference are not known.
+        """
+        if not self.loop.known:
+            raise ModelError(
+                "the position error of a closed loop says nothing without the robot's own law and reference",
+                remedy="give both: ClosedLoop(law=..., references=...), or take idim-iv or didim",
+            )
+        return super(ClosedLoopOutputError, self).fit_problem(problem)
 
     def measured(self, run: Run) -> FloatArray:
         """Return the position [rad or m]."""

@@ -48,7 +48,7 @@ class NetworkSettings:
     """
 
     hidden: tuple[int, ...] = (12,)
-    penalty: float = 10.0
+    penalty: float = 100.0
     passes: int = 300
     seed: int = 0
 
@@ -227,7 +227,7 @@ def _trained(samples: _Samples, values: FloatArray, settings: NetworkSettings) -
     inputs = (samples.motion - centre) / scale
     size = _rms(residual)
     network = MLPRegressor(
-        settings.hidden,
+        hidden_layer_sizes=settings.hidden,
         activation="tanh",
         solver="lbfgs",
         alpha=settings.penalty,
@@ -236,7 +236,7 @@ def _trained(samples: _Samples, values: FloatArray, settings: NetworkSettings) -
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # stopped early is smoother, and judged all the same
-        network.fit(inputs, (residual / size).reshape(len(inputs), -1))
+        network.fit(inputs, np.squeeze(residual / size, axis=1) if size.size == 1 else residual / size)
     return ResidualNetwork(
         weights=tuple(network.coefs_),
         biases=tuple(network.intercepts_),

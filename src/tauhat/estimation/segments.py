@@ -150,11 +150,13 @@ def reversals(track: Track, tops: FloatArray, *, rules: SegmentRules) -> list[Re
             share = dq[row] / (dq[row] - dq[row + 1])
             t = float(track.t[row] + share * (track.t[row + 1] - track.t[row]))
             near = np.flatnonzero(np.abs(track.t - t) <= rules.window)
+            if near.size < _FEWEST:
+                continue
             rows = slice(int(near[0]), int(near[-1]) + 1)
             before, after = dq[rows.start : row + 1], dq[row + 1 : rows.stop]
             swept = min(np.abs(before).max(), np.abs(after).max()) > max(STANDSTILL * tops[joint], _STILL)
             once = (before * before[-1] > 0.0).all() and (after * after[0] > 0.0).all()
-            if swept and once and near.size >= _FEWEST:
+            if swept and once:
                 found.append(Reversal(track, joint, rows, t))
     return found
 

@@ -37,6 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, read_only
+from tauhat.blas import single_threaded
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.dynamics.motion import Motion
 from tauhat.errors import ModelError
@@ -194,6 +195,7 @@ class AdaptiveInputError(Recursion):
         if self.passes < 1:
             raise ModelError("at least one pass is needed", got=self.passes)
 
+    @single_threaded
     def fit_problem(self, problem: Problem) -> Solution:
         """Return the mean of the parameters over the last pass; the last trusted ones when the model is lost."""
         refuse_memory(problem, self.key)

@@ -7,14 +7,18 @@ Adaline (normalised least mean squares), one row at a time, all joints of a samp
 
     z += mu w (y - w'z) / (w'w)                      converges for 0 < mu < 2, fastest at 1
 
-At a constant step it keeps walking about the solution, the wider the larger mu. Pass p therefore takes `mu / p`: the
-steps add up to infinity and their squares do not, as Robbins and Monro (1951) ask.
+At a constant step it keeps walking about the solution, the wider the larger mu. Pass p therefore takes `mu / p^(2/3)`:
+the steps add up to infinity and their squares do not, as Robbins and Monro (1951) ask. What it solves is least squares
+with every row divided by its own length.
 
 Hopfield-Tank: neurons `z = z_0 + c tanh(u)` that cannot leave the box of half width c, driven down the energy
 `E = |W z - y|^2 / 2n` of everything seen so far, `A = W'W/n`, `b = W'y/n`:
 
     u += eta (b - A z)                               eta = 1 / (c trace A): below 2 over the largest slope times
                                                      eigenvalue, hence E never rises
+
+Either has settled when no column goes with the residual any more: the mean of column times residual is below a tolerance
+times the torque. (That the values hardly change says nothing: steps shrink, and bad directions are slow.)
 
 Source: Widrow, Hoff, "Adaptive switching circuits", 1960; Tank, Hopfield, "Simple neural optimization networks", 1986;
 Alonso, Mendonca, Rocha, "Hopfield neural networks for on-line parameter estimation", 2009.
@@ -35,6 +39,7 @@ from tauhat.estimation.problem import Problem
 from tauhat.estimation.solution import Solution
 
 _SATURATED = 0.99  # of its box: a parameter there has been stopped by it
+_SHRINKING = 2.0 / 3.0  # power of the pass by which Adaline's step shrinks
 _SLOW = "it is slow along what the motion hardly shows: raise `passes`, or use least squares on the same rows"
 
 
@@ -64,13 +69,13 @@ class Adaline(Recursion):
 
     step : mu of the first pass
     passes : at most over the recordings
-    tolerance : largest change of a scaled parameter from pass to pass, in parts of the largest, that counts as settled
+    tolerance : largest mean of scaled column times residual, in parts of the torque, that counts as settled
     """
 
     key: ClassVar[str] = "adaline"
     step: float = 1.0
     passes: int = 200
-    tolerance: float = 1e-4
+    tolerance: float = 5e-4
 
     def __post_init__(self) -> None:
         super(Adaline, self).__post_init__()
@@ -88,12 +93,14 @@ class Adaline(Recursion):
         rows = scaled_rows(problem)
         norms = np.maximum(np.einsum("ij,ij->i", rows.matrix, rows.matrix), np.finfo(float).tiny)
         directions = rows.matrix / norms[:, None]
+        level = float(np.sqrt(np.mean(rows.target**2)))
         values = np.zeros(problem.base.n_b)
         for done in range(1, self.passes + 1):
-            before, step = values, self.step / done
+            step = self.step / done**_SHRINKING
             for row, direction, target in zip(rows.matrix, directions, rows.target, strict=True):
                 values = values + (step * (target - row @ values)) * direction  # `move`, norms found once
-            if np.abs(values - before).max() <= self.tolerance * np.abs(values).max():
+            pull = problem.base.n_b * (rows.target - rows.matrix @ values) @ directions / rows.target.size
+            if np.abs(pull).max() <= self.tolerance * level:
                 return _solution(problem, rows, values, passes=done, cause=(f"settled after {done} passes", ""))
         cause = f"not settled after {self.passes} passes", _SLOW
         return _solution(problem, rows, values, passes=self.passes, cause=cause)
@@ -111,7 +118,7 @@ class HopfieldTank(Recursion):
     key: ClassVar[str] = "hopfield"
     box: float = 20.0
     passes: int = 200
-    tolerance: float = 1e-4
+    tolerance: float = 1e-5
 
     def __post_init__(self) -> None:
         super(HopfieldTank, self).__post_init__()
@@ -145,14 +152,13 @@ class HopfieldTank(Recursion):
         gram, right, size = energy
         each = rows.target.size // problem.model.robot.n_v
         for done in range(2, self.passes + 1):
-            before = np.tanh(neurons)
             for _ in range(each):
                 neurons = self.move(neurons, gram, right, size=size)
             filled = np.tanh(neurons)
             if np.abs(filled).max() > _SATURATED:
                 met = f"{int((np.abs(filled) > _SATURATED).sum())} parameters met their box"
                 return _solution(problem, rows, size * filled, passes=done, cause=(met, "raise `box`"))
-            if np.abs(filled - before).max() <= self.tolerance * np.abs(filled).max():
+            if np.abs(right - gram @ (size * filled)).max() <= self.tolerance * size / self.box:
                 return _solution(problem, rows, size * filled, passes=done, cause=(f"settled after {done} passes", ""))
         cause = f"not settled after {self.passes} passes", _SLOW
         return _solution(problem, rows, size * np.tanh(neurons), passes=self.passes, cause=cause)

@@ -1,0 +1,190 @@
+"""Error bars that know that shapes were chosen, too.
+
+A width, a speed or a length that was chosen on the same recordings is not known exactly, and coefficients beside it are
+less sure than if it were. To first order a shape s adds one unknown, `d ln s`, with the column `d(Y x)/d ln s`, which
+the covariance is taken with (variable projection; Golub, Pereyra 1973). A shape is known beforehand to a factor of about
+`e^PRIOR`: without that, a term whose coefficient is zero would leave its shape, and so its neighbours, unbounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, IntArray
+from tauhat.dynamics.base import BaseParameters
+from tauhat.dynamics.motion import Motion
+from tauhat.dynamics.terms import Parameter, ShapedTerm, Term
+from tauhat.estimation.evidence import Block, Evidence, collect_all
+from tauhat.estimation.problem import Problem
+from tauhat.estimation.solution import Solution, honest_covariance, joint_residuals, solve
+from tauhat.robots.robot import Robot
+
+PRIOR = 0.7  # standard deviation of the logarithm of a shape before the recordings are looked at: a factor of two
+_STEP = 0.05  # of the logarithm, in the difference quotient
+_FAINT = 1e-6  # of the largest such column: a term that is not there has no shape
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShapeSlope(Term):
+    """The derivative of a shaped term's torque by the logarithm of its shape, one parameter a joint.
+
+    term : with its shapes
+    coefficients : of the term's columns, joint by joint as its parameters
+    """
+
+    key: ClassVar[str] = "shape-slope"
+    stateful: ClassVar[bool] = True
+    term: ShapedTerm
+    coefficients: tuple[float, ...]
+
+    def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
+        """Return one parameter a joint that has the term."""
+        return tuple(Parameter(symbol="dln", joint=int(joint), unit="1") for joint in self.term.present(robot))
+
+    def support(self, robot: Robot) -> tuple[IntArray, ...]:
+        """Return each joint's own parameter."""
+        place = {int(joint): index for index, joint in enumerate(self.term.present(robot))}
+        return tuple(np.array([place[j]] if j in place else [], dtype=np.intp) for j in range(robot.n_v))
+
+    def columns(
+        self, robot: Robot, motion: Motion, state: FloatArray | None
+    ) -> tuple[tuple[FloatArray, ...], FloatArray | None]:
+        """Return the difference quotient; the states of both its ends are stacked."""
+        before = (None, None) if state is None else (state[0], state[1])
+        upper, after_upper = self._torque(robot, motion, 1.0 + _STEP, before[0])
+        lower, after_lower = self._torque(robot, motion, 1.0 / (1.0 + _STEP), before[1])
+        width = 2.0 * np.log1p(_STEP)
+        slopes = tuple((up - low) / width for up, low in zip(upper, lower, strict=True))
+        if after_upper is None or after_lower is None:
+            return slopes, None
+        return slopes, np.stack([after_upper, after_lower])
+
+    def _torque(
+        self, robot: Robot, motion: Motion, factor: float, state: FloatArray | None
+    ) -> tuple[tuple[FloatArray, ...], FloatArray | None]:
+        form = self.term.with_shape([factor * value for value in self.term.shape])
+        columns, after = form.columns(robot, motion, state)
+        values = np.array(self.coefficients)
+        supports = self.term.support(robot)
+        made = (values[own] @ rows for own, rows in zip(supports, columns, strict=True))
+        empty = np.zeros((0, motion.n_t))
+        return tuple(row[None] if own.size else empty for row, own in zip(made, supports, strict=True)), after
+
+
+def covariance_with_shapes(problem: Problem, solution: Solution, *, ridge: float = 0.0) -> FloatArray:
+    """Return the covariance of the base parameters with the shapes of the model's terms among the unknowns, (n_b, n_b).
+
+    Parameters
+    ----------
+    solution : of the problem; its own covariance takes the shapes as known, and is returned where there are none
+    ridge : of the estimator
+    """
+    slopes = _slopes(problem, solution)
+    if not slopes:
+        return solution.covariance
+    evidence = _widened(problem, slopes)
+    n_b = problem.base.n_b
+    sizes = _column_sizes(evidence)
+    kept = np.flatnonzero((np.arange(evidence.n_b) < n_b) | (sizes > _FAINT * sizes[:n_b].max()))
+    evidence = evidence.keeping(kept)
+    if kept.size == n_b:
+        return solution.covariance
+    known = _with_prior(evidence, n_b, solution)
+    values = solve(known, solution.weights, ridge=ridge)
+    wide = honest_covariance(known, solution.weights, values, ridge=ridge)[:n_b, :n_b]
+    spread = np.sqrt(np.maximum(np.diag(wide), np.diag(solution.covariance)) / np.diag(wide))
+    return np.asarray(wide * np.outer(spread, spread))
+
+
+def _slopes(problem: Problem, solution: Solution) -> tuple[ShapeSlope, ...]:
+    model, base = problem.model, problem.base
+    standard = np.zeros(model.n_p)
+    standard[base.independent] = solution.values
+    slopes, start = [], 0
+    for term in model.terms:
+        count = len(term.parameters(model.robot))
+        own = standard[start : start + count]
+        start += count
+        if isinstance(term, ShapedTerm) and term.shape and own.any():
+            slopes.append(ShapeSlope(term=term, coefficients=tuple(own.tolist())))
+    return tuple(slopes)
+
+
+def _widened(problem: Problem, slopes: Sequence[ShapeSlope]) -> Evidence:
+    """Return the evidence on the base parameters and, behind them, the shapes."""
+    model, base = problem.model, problem.base
+    added = _Bundle(slopes=tuple(slopes))
+    wide = replace(model, terms=(*model.terms, added))
+    names = tuple(parameter.name for parameter in wide.parameters)
+    kept = np.concatenate([base.independent, np.arange(model.n_p, len(names))])
+    nothing = np.zeros(0, dtype=np.intp)
+    chosen = BaseParameters(
+        names=names,
+        independent=kept,
+        dependent=nothing,
+        regrouping=np.zeros((kept.size, 0)),
+        unidentifiable=np.setdiff1d(np.arange(len(names)), kept),
+    )
+    return collect_all(wide, chosen, problem.recordings, problem.processing)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Bundle(Term):
+    """Several slopes as one term: a model has each kind of term once."""
+
+    key: ClassVar[str] = "shape-slopes"
+    stateful: ClassVar[bool] = True
+    slopes: tuple[ShapeSlope, ...]
+
+    def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
+        return tuple(parameter for slope in self.slopes for parameter in slope.parameters(robot))
+
+    def support(self, robot: Robot) -> tuple[IntArray, ...]:
+        starts = np.cumsum([0, *(len(slope.parameters(robot)) for slope in self.slopes)])
+        parts = [slope.support(robot) for slope in self.slopes]
+        return tuple(
+            np.concatenate([start + part[joint] for start, part in zip(starts[:-1], parts, strict=True)])
+            for joint in range(robot.n_v)
+        )
+
+    def columns(
+        self, robot: Robot, motion: Motion, state: FloatArray | None
+    ) -> tuple[tuple[FloatArray, ...], FloatArray | None]:
+        before = [None] * len(self.slopes) if state is None else list(state)
+        made = [slope.columns(robot, motion, part) for slope, part in zip(self.slopes, before, strict=True)]
+        joined = tuple(np.concatenate([own[joint] for own, _ in made]) for joint in range(robot.n_v))
+        after = np.empty(len(made), dtype=object)
+        after[:] = [part for _, part in made]
+        return joined, after
+
+
+def _column_sizes(evidence: Evidence) -> FloatArray:
+    squares = np.zeros(evidence.n_b)
+    for support, factor in zip(evidence.supports, evidence.total.factors, strict=True):
+        squares[support] += np.sum(factor[:, :-1] ** 2, axis=0)
+    return np.sqrt(squares)
+
+
+def _with_prior(evidence: Evidence, n_b: int, solution: Solution) -> Evidence:
+    """Return the evidence with what is known of shapes beforehand, in equal parts in every block of time."""
+    values = np.concatenate([solution.values, np.zeros(evidence.n_b - n_b)])
+    noise = np.maximum(joint_residuals(evidence, values), np.finfo(float).tiny)
+    share = 1.0 / (PRIOR * np.sqrt(len(evidence.blocks)))
+    extra = []
+    for joint, support in enumerate(evidence.supports):
+        places = np.flatnonzero(support >= n_b)
+        rows = np.zeros((places.size, support.size + 1))
+        rows[np.arange(places.size), places] = share * noise[joint]
+        extra.append(rows)
+    blocks = tuple(
+        Block(
+            factors=tuple(np.vstack([factor, rows]) for factor, rows in zip(block.factors, extra, strict=True)),
+            n_t=block.n_t,
+        )
+        for block in evidence.blocks
+    )
+    return evidence.of_blocks(blocks)
