@@ -10,7 +10,7 @@ import numpy as np
 from sample_arms import Truth, motion_from_rest, planar_truth
 from tauhat.arrays import FloatArray
 from tauhat.control import PDGravity
-from tauhat.dynamics import base_parameters, gravity_torque
+from tauhat.dynamics import BaseParameters, base_parameters, gravity_torque
 from tauhat.dynamics.simulated_arm import Followed, Gains, Moved, Stepping, follow, simulated_arm
 from tauhat.estimation import collect
 from tauhat.estimation.closed_loop import ClosedLoop, SampledReference
@@ -37,7 +37,7 @@ class Driven:
     @property
     def values(self) -> FloatArray:
         """True base parameters."""
-        return base_parameters(self.truth.model).projection @ self.truth.standard
+        return planar_base().projection @ self.truth.standard
 
     def recording(self, rng: np.random.Generator, *, position: float = 0.0, torque: float = 0.05) -> Recording:
         """Return the log with white noise of these deviations on every joint."""
@@ -62,9 +62,13 @@ def driven(seconds: float = SECONDS) -> Driven:
     return Driven(truth, t, moved, ClosedLoop(law=LAW, references=(reference,)))
 
 
+@cache
+def planar_base() -> BaseParameters:
+    return base_parameters(planar_truth().model)
+
+
 def problem(recording: Recording, *, processing: Processing = LATE) -> Problem:
     """Return the problem of identifying the planar arm, shapes known."""
-    model = driven().truth.model
-    base = base_parameters(model)
+    model, base = driven().truth.model, planar_base()
     evidence = collect(model, base, recording, processing)
     return Problem(model=model, base=base, recordings=(recording,), processing=processing, evidence=evidence)

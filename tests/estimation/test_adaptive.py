@@ -7,8 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-
 from filter_problems import exact_problem, noisy_problem, true_values, truth
+
 from sample_arms import motion_from_rest
 from tauhat.blas import single_threaded
 from tauhat.errors import ModelError, TauhatWarning

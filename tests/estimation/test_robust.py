@@ -29,6 +29,7 @@ from tauhat.errors import ModelError
 from tauhat.estimation import (
     BisquareLeastSquares,
     CauchyLeastSquares,
+    EssentialLeastSquares,
     HuberLeastSquares,
     OrdinaryLeastSquares,
     PhysicalConstraints,
@@ -206,3 +207,11 @@ def test_too_few_rows_are_refused():
     few = replace(problem, evidence=replace(problem.evidence, blocks=(block,)))
     with pytest.raises(ModelError, match="cannot determine"):
         HuberLeastSquares().fit_problem(few)
+
+
+def test_essential_parameters_are_looked_for_on_the_weighted_rows():
+    problem = touched(6)
+    rough = EssentialLeastSquares(inner=BisquareLeastSquares()).fit_problem(problem)
+    plain = EssentialLeastSquares().fit_problem(problem)
+    assert torque_error(rough.values, problem) < 0.3 * torque_error(plain.values, problem)
+    assert rough.evidence is not None

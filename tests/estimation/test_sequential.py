@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-
 from filter_problems import SETTINGS, names, noisy, problem_of, true_values, truth
+
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError
 from tauhat.estimation.segments import SegmentRules, constant_runs, reversals, tracks

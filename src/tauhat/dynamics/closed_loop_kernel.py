@@ -68,7 +68,8 @@ def leapfrog_kernel(body, passive, law, reference, start, times, out):  # type: 
                     e = q_ref[k, j] + part * (q_ref[after, j] - q_ref[k, j]) - q[j]
                     de = dq_ref[k, j] + part * (dq_ref[after, j] - dq_ref[k, j]) - v[j]
                     ahead = ff[k, j] + part * (ff[after, j] - ff[k, j])
-                    tau[j], free[j] = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * integral[j], limit[j])
+                    summed = integral[j] + (0.5 * h * e if hold == 0 else 0.0)  # of the trapezoidal rule
+                    tau[j], free[j] = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * summed, limit[j])
                     if free[j] > 0.0 or tau[j] * e < 0.0:
                         integral[j] += h * max(hold, 1) * e
                     if hold > 0:

@@ -26,7 +26,8 @@ import numpy as np
 from tauhat.arrays import IntArray, read_only
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence
-from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares
+from tauhat.estimation.least_squares import Estimator, LeastSquares, Solved, WeightedLeastSquares
+from tauhat.estimation.problem import Problem
 from tauhat.estimation.solution import Solution
 
 SIGNIFICANCE = 0.05  # how often a parameter that is zero is kept for nothing
@@ -94,6 +95,17 @@ class EssentialLeastSquares(Estimator):
     def solve(self, evidence: Evidence) -> Solved:
         """Return the values of the whole model: which parameters are essential is decided by `fit`."""
         return self.inner.solve(evidence)
+
+    def settled(self, problem: Problem) -> Problem:
+        """Return the problem with what the inner method chooses itself."""
+        return self.inner.settled(problem)
+
+    def fit_problem(self, problem: Problem) -> Solution:
+        """Return the solution on the evidence as the inner method weighs its rows, where it does."""
+        if isinstance(self.inner, LeastSquares):
+            return self.fit(problem.evidence)
+        weighted = self.inner.fit_problem(problem).evidence
+        return replace(self.fit(weighted or problem.evidence), evidence=weighted)
 
     def fit(self, evidence: Evidence) -> Solution:
         """Return values, covariance and diagnostics of the essential parameters."""

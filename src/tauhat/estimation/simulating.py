@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tauhat.arrays import FloatArray
+from tauhat.blas import single_threaded
 from tauhat.dynamics.forward import nominal_masses
 from tauhat.dynamics.simulated_arm import Moved
 from tauhat.dynamics.terms import INERTIAL_SYMBOLS
@@ -83,6 +84,7 @@ class SimulationEstimator(Estimator):
         """Return the values of the inner least squares: nothing can be simulated from evidence alone."""
         return self.inner.solve(evidence)
 
+    @single_threaded
     def fit_problem(self, problem: Problem) -> Solution:
         """Return the solution after as many passes as it takes.
 
@@ -125,7 +127,7 @@ class SimulationEstimator(Estimator):
     def _first(self, runs: SimulatedRuns) -> Tried:
         """Return the values of least squares, or the nominal ones where those move no robot."""
         problem = runs.problem
-        values = self.inner.fit_problem(problem).values
+        values = self.inner.solve(problem.evidence).values
         try:
             return tried_in(runs, values)
         except (ModelError, SimulationError) as error:

@@ -8,7 +8,7 @@ joint counts as much as a large one.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,8 @@ from tauhat.estimation.delay import position_delay
 from tauhat.estimation.evidence import collect_all
 from tauhat.estimation.iterating import first_loaded
 from tauhat.estimation.least_squares import WeightedLeastSquares
+from tauhat.estimation.problem import Problem
+from tauhat.estimation.shape_uncertainty import nearer_shapes
 from tauhat.estimation.shapes import chosen_form
 from tauhat.estimation.solution import joint_residuals
 from tauhat.recordings.choice import MOTION_CUTOFF, choose_processing, top_speeds
@@ -29,6 +31,7 @@ from tauhat.recordings.recording import Recording
 
 MOST_SAMPLES = 20_000  # settings are chosen on so many samples at most
 _SWEEPS = 2  # over the terms that have a shape: what one takes depends on the others
+_STEPS = 3  # of Gauss and Newton, from the grid to the best shapes
 _LEAST_GAIN = 0.02  # a candidate must leave that much less residual to replace the default
 
 
@@ -115,6 +118,28 @@ def _shaped(
             model = model.with_term(chosen_form(model, base, forms, recordings, processing))
         if model.terms == before:
             break
+    return _refined(model, base, {forms[0].key for forms in choices}, recordings, processing)
+
+
+def _refined(
+    model: TorqueModel,
+    base: BaseParameters,
+    keys: Collection[str],
+    recordings: Sequence[Recording],
+    processing: Processing,
+) -> TorqueModel:
+    """Return the model with the shapes of the terms `keys` taken off the grid, as long as that lowers the residual."""
+    level = residual_level(model, base, recordings, processing) if keys else 0.0
+    for _ in range(_STEPS if keys else 0):
+        evidence = collect_all(model, base, recordings, processing, most_blocks=1)
+        problem = Problem(
+            model=model, base=base, recordings=tuple(recordings), processing=processing, evidence=evidence
+        )
+        moved = nearer_shapes(problem, WeightedLeastSquares().fit(evidence), keys)
+        nearer = residual_level(moved, base, recordings, processing)
+        if not nearer < level:
+            break
+        model, level = moved, nearer
     return model
 
 

@@ -58,6 +58,9 @@ class Diffuse(Beginning):
 class FirstStretch(Beginning):
     """Weighted least squares on the first part of every recording; the filter sees only the rest.
 
+    Only the standard errors are taken from that fit: what a short stretch says of correlations is often a false
+    certainty, and a filter never forgets it.
+
     share : of each recording
     widened : factor on the standard errors of that fit
     """
@@ -85,7 +88,7 @@ class FirstStretch(Beginning):
         evidence = collect_all(problem.model, problem.base, first, problem.processing)
         solution = WeightedLeastSquares(power=1.0).fit(evidence)
         rest = tuple(recording.rows(cut, recording.n_t) for recording, cut in pairs)
-        return Start(solution.values, self.widened**2 * solution.covariance, rest)
+        return Start(solution.values, np.diag(self.widened**2 * np.diag(solution.covariance)), rest)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,8 +17,8 @@ Hopfield-Tank: neurons `z = z_0 + c tanh(u)` that cannot leave the box of half w
     u += eta (b - A z)                               eta = 1 / (c trace A): below 2 over the largest slope times
                                                      eigenvalue, hence E never rises
 
-Either has settled when no column goes with the residual any more: the mean of column times residual is below a tolerance
-times the torque. (That the values hardly change says nothing: steps shrink, and bad directions are slow.)
+Either has settled when no column goes with the residual any more: the mean of column times residual is below a
+tolerance times the torque. (That the values hardly change says nothing: steps shrink, and bad directions are slow.)
 
 Source: Widrow, Hoff, "Adaptive switching circuits", 1960; Tank, Hopfield, "Simple neural optimization networks", 1986;
 Alonso, Mendonca, Rocha, "Hopfield neural networks for on-line parameter estimation", 2009.
