@@ -49,7 +49,7 @@ from tauhat.simulation import nominal_parameters
 from tauhat.verification import standard_parameters
 
 METHODS = (
-    *("ols", "wls", "irls", "irls-bisquare", "irls-cauchy", "tls"),
+    *("ols", "wls", "irls", "irls-huber", "irls-bisquare", "tls"),
     *("ridge", "prior", "ml", "recursive", "hybrid"),
 )
 CONDITIONS = ("clean", "spikes", "touches", "shared", "columns")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import lti, lsim
+from scipy.signal import lsim, lti
 
 from sample_arms import planar_arm, planar_truth
 from tauhat.dynamics import Coulomb, Motion, TorqueModel, Viscous, torque_model
@@ -93,14 +93,14 @@ def test_the_simulated_motion_obeys_the_torque_model(method):
     columns, _ = model.columns(Motion(q=moved.q, dq=moved.dq, ddq=moved.ddq), layout)
     rows = [layout.of_joint(joint) for joint in range(2)]
     torque = np.array([standard[layout.parameters[part]] @ columns[part] for part in rows])
-    assert np.abs(torque - moved.tau).max() < {"leapfrog": 2e-4, "runge-kutta": 1e-12}[method]
+    assert np.abs(torque - moved.tau).max() < {"leapfrog": 3e-4, "runge-kutta": 1e-12}[method]
 
 
 def test_leapfrog_is_of_second_order_and_runge_kutta_of_fourth():
     fine = planar(method="runge-kutta", substeps=32)[2].q
     for method, order in (("leapfrog", 2), ("runge-kutta", 4)):
-        errors = [np.abs(planar(method=method, substeps=n)[2].q - fine).max() for n in (1, 2)]
-        assert errors[0] / errors[1] == pytest.approx(2**order, rel=0.15)
+        errors = [np.abs(planar(method=method, substeps=n)[2].q - fine).max() for n in (4, 8)]
+        assert errors[0] / errors[1] == pytest.approx(2**order, rel=0.1)
 
 
 def test_sharp_friction_neither_overshoots_nor_changes_with_the_step():
@@ -117,12 +117,14 @@ def test_torque_stays_at_its_limit():
 
 def test_a_held_torque_is_a_delay_of_half_its_period():
     free, late = (slid(substeps=10, hold=hold, law=gains(200.0, 20.0)) for hold in (0, 100))
-    # Ten samples of hold: the law acts 5 ms late, which takes kd * 5 ms from the mass, and kp * 5 ms from the damping.
+    # Held for ten samples the law acts 5 ms late: (kp + kd s) (1 - 5 ms s) instead of kp + kd s.
     lag = 5e-3
-    system = lti([20.0 - 200.0 * lag, 200.0], [MASS - 20.0 * lag, FRICTION + 20.0 - 200.0 * lag, 200.0])
+    system = lti([-20.0 * lag, 20.0 - 200.0 * lag, 200.0], [MASS - 20.0 * lag, FRICTION + 20.0 - 200.0 * lag, 200.0])
     t = np.arange(0.0, 3.0, 1e-3)
     _, oracle, _ = lsim(system, sines(t)[0][:, 0], t)
-    assert np.abs(late.q[0] - oracle).max() < 0.1 * np.abs(late.q[0] - free.q[0]).max()
+    settled = slice(1500, None)  # the first-order delay is another system at the start
+    error, effect = np.abs(late.q[0] - oracle)[settled], np.abs(late.q[0] - free.q[0])[settled]
+    assert error.max() < 0.1 * effect.max()
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -152,6 +154,7 @@ ELEMENTS = (
 
 
 @pytest.mark.parametrize("term", ELEMENTS, ids=[f"{term.key}{sum(term.joints) or ''}" for term in ELEMENTS])
+@settings(max_examples=10)
 @given(seed=st.integers(0, 1000))
 def test_the_torque_a_term_takes_is_that_of_its_columns(term, seed):
     robot = planar_arm()
@@ -159,7 +162,7 @@ def test_the_torque_a_term_takes_is_that_of_its_columns(term, seed):
     rng = np.random.default_rng(seed)
     own = 0.3 * rng.uniform(0.5, 1.0, len(term.parameters(robot)))
     standard = np.concatenate([robot.inertia.ravel(), own])
-    t = np.arange(0.0, 0.5, 1e-3)
+    t = np.arange(0.0, 0.3, 1e-3)
     q, dq = sines(t, 2)
     followed = Followed(q, dq, np.zeros_like(q))
     moved = follow(
@@ -170,9 +173,9 @@ def test_the_torque_a_term_takes_is_that_of_its_columns(term, seed):
     columns, _ = model.columns(Motion(q=moved.q, dq=moved.dq, ddq=moved.ddq, step=1e-3), layout)
     parts = [layout.of_joint(joint) for joint in range(2)]
     torque = np.array([standard[layout.parameters[part]] @ columns[part] for part in parts])
-    # The load is known from the step before only.
-    allowed = 2e-2 if term.iterated else 1e-9
-    assert np.abs(torque - moved.tau)[:, 1:].max() < allowed * np.abs(moved.tau).max()
+    # The load is that of the step before: unknown at the start, where the arm is thrown into motion.
+    begin, allowed = (50, 1e-2) if term.iterated else (0, 1e-9)
+    assert np.abs(torque - moved.tau)[:, begin:].max() < allowed * np.abs(moved.tau).max()
 
 
 def test_a_term_without_forward_dynamics_is_refused_by_name():
@@ -196,8 +199,8 @@ def test_the_arm_moves_as_mujocos_does():
     without = type(plant)(inertia=plant.inertia, rotor=np.full(6, 0.3), viscous=plant.viscous,
                           coulomb=np.zeros(6), offset=np.zeros(6))  # fmt: skip
     motion = random_fourier(robot, period=3.0, harmonics=3, rng=np.random.default_rng(4))
-    settings = ExperimentSettings(timestep=1e-4, control_rate=10_000.0, controller=law, settle=0.1)
-    truth = simulate(robot, motion, rng=np.random.default_rng(0), parameters=without, settings=settings).truth
+    experiment = ExperimentSettings(timestep=1e-4, control_rate=10_000.0, controller=law, settle=0.1)
+    truth = simulate(robot, motion, rng=np.random.default_rng(0), parameters=without, settings=experiment).truth
     model = torque_model(robot, "inertia,rotor,viscous")
     standard = np.concatenate([without.inertia.ravel(), without.rotor, without.viscous])
     asked = truth.reference

@@ -6,18 +6,22 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from sample_arms import Truth, motion_from_rest, planar_truth
 from tauhat.arrays import FloatArray
+from tauhat.blas import single_threaded
 from tauhat.control import PDGravity
 from tauhat.dynamics import BaseParameters, base_parameters, gravity_torque
 from tauhat.dynamics.simulated_arm import Followed, Gains, Moved, Stepping, follow, simulated_arm
-from tauhat.estimation import collect
+from tauhat.estimation import Estimator, collect
 from tauhat.estimation.closed_loop import ClosedLoop, SampledReference
 from tauhat.estimation.problem import Problem
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 
+SEEDS = 20
 RATE = 250.0
 SECONDS = 8.0
 LAW = PDGravity(kp=np.array([500.0, 200.0]), kd=np.array([40.0, 15.0]))
@@ -72,3 +76,29 @@ def problem(recording: Recording, *, processing: Processing = LATE) -> Problem:
     model, base = driven().truth.model, planar_base()
     evidence = collect(model, base, recording, processing)
     return Problem(model=model, base=base, recordings=(recording,), processing=processing, evidence=evidence)
+
+
+@single_threaded
+def errors_of(
+    method: Estimator,
+    *,
+    position: float = 1e-4,
+    torque: float = 0.05,
+    processing: Processing = LATE,
+    seeds: int = SEEDS,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return errors (n_seeds, n_b) and whether the truth is inside the 95 % intervals."""
+    arm = driven()
+    errors, inside = [], []
+    for seed in range(seeds):
+        log = arm.recording(np.random.default_rng(seed), position=position, torque=torque)
+        solution = method.fit_problem(problem(log, processing=processing))
+        errors.append(solution.values - arm.values)
+        half = stdtrit(solution.degrees, 0.975) * np.sqrt(np.diag(solution.covariance))
+        inside.append(np.abs(errors[-1]) <= half)
+    return np.array(errors), np.array(inside)
+
+
+def relative_bias(errors: FloatArray) -> FloatArray:
+    """Return the mean errors in parts of the parameters, (n_b,); those near zero in parts of 0.05."""
+    return errors.mean(axis=0) / np.maximum(np.abs(driven().values), 0.05)

@@ -12,7 +12,7 @@ from rough_logs import SETTINGS, TRUTH, clean, problem_of, run, touched
 from sample_arms import WIDTHS
 from tauhat.dynamics import Coulomb, TorqueModel, base_parameters
 from tauhat.errors import ModelError, TauhatWarning
-from tauhat.estimation import HuberLeastSquares, HybridLeastSquares, collect_all, identify
+from tauhat.estimation import CauchyLeastSquares, HuberLeastSquares, HybridLeastSquares, collect_all, identify
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.solution import joint_residuals
 from tauhat.verification import verify
@@ -50,7 +50,7 @@ def test_wrong_widths_are_mended(make):
 def test_right_widths_stay_near_and_the_fit_is_that_of_reweighted_least_squares():
     settled = HybridLeastSquares().settled(clean(1))
     np.testing.assert_allclose(widths_of(settled.model), WIDTHS, rtol=0.5)
-    hybrid, plain = HybridLeastSquares().fit_problem(settled), HuberLeastSquares().fit_problem(settled)
+    hybrid, plain = HybridLeastSquares().fit_problem(settled), CauchyLeastSquares().fit_problem(settled)
     assert np.array_equal(hybrid.values, plain.values)
 
 

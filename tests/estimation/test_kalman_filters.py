@@ -149,7 +149,7 @@ def test_state_filters_recover_the_parameters_inside_their_errors(method):
 
 
 def test_a_state_filter_that_knows_its_noise_is_as_good_as_least_squares_on_the_same_stretch():
-    noise = StateNoise(torque=(TORQUE_NOISE / 2**0.5,) * 2, position=(POSITION_NOISE,) * 2)
+    noise = StateNoise(torque=(TORQUE_NOISE / 10**0.5,) * 2, position=(POSITION_NOISE,) * 2)
     for seed in range(3):
         problem = noisy_problem(seed)
         solution = SquareRootExtendedKalman(noise=noise).fit_problem(problem)
@@ -207,7 +207,7 @@ def test_a_jump_of_the_torque_in_the_middle_is_noticed():
     recording = truth().recording(seconds=8.0, rate=500.0)
     torque = recording.tau.copy()
     torque[2500:] *= -1.0
-    quiet = StateNoise(torque=(0.1, 0.1), position=(1e-4, 1e-4))
+    quiet = StateNoise(torque=(0.03, 0.03), position=(1e-4, 1e-4))
     method = SquareRootExtendedKalman(noise=quiet, test=InnovationTest(limit=20.0))
     with pytest.warns(TauhatWarning, match="diverged at"):
         solution = method.fit_problem(problem_of(replace(recording, tau=torque)))

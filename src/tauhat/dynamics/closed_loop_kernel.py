@@ -36,124 +36,175 @@ RUNAWAY = 1e3  # [rad/s or m/s] no robot moves this fast
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def leapfrog_kernel(body, passive, law, reference, start, times, out):  # type: ignore[no-untyped-def]
     """Simulate by leapfrog steps; see the head of this file."""
-    step, substeps, hold = times
+    n_t, n_v = reference[0].shape
+    rows = np.zeros((16, n_v))
+    rows[0], rows[1] = start[0], start[1]
+    bent, work, masses = np.zeros(passive[0].size), np.empty(40 * n_v), np.empty((2, n_v, n_v))
+    code, joint = _leap(-1, 0, body, passive, law, reference, times, rows, bent, work, masses)
+    if code != FINE:
+        return code, 0, joint
+    _begin(start, rows)
+    for k in range(n_t):
+        for s in range(times[1]):
+            code, joint = _leap(k, s, body, passive, law, reference, times, rows, bent, work, masses)
+            if code != FINE:
+                return code, k, joint
+            if s == 0:
+                _record(rows, law, k, out)
+            failed = _move(passive, times, rows, bent)
+            if failed >= 0:
+                return RAN_AWAY, k, failed
+    return FINE, -1, -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _leap(turn, s, body, passive, law, reference, times, rows, bent, work, masses):  # type: ignore[no-untyped-def]
+    """Find the change of speed of one step; return (code, joint).
+
+    `rows` are 16 quantities, (n_v,) each: q, u, v, a, d, tau, keep, load, free, integral, held torque, moved, bias,
+    taken, damping, stiffness.
+    """
+    q, u, v, a, d, tau, keep, load = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7]
+    free, bias, taken, damping, stiffness = rows[8], rows[12], rows[13], rows[14], rows[15]
+    h, mass = times[0] / times[1], masses[0]
+    for j in range(q.size):
+        v[j] = u[j] + 0.5 * h * a[j]
+    _mass_and_load(body, q, v, a, work, bias, mass, load)
+    if s == 0:  # once a sample: what is added to the diagonal would hide a body of negative mass
+        masses[1] = mass
+        failed = factorised(masses[1])
+        if failed >= 0:
+            return NO_BODY, failed
+    passive_kernel(*passive, q, v, load, bent, taken, damping, stiffness)
+    _steer(turn, s, law, reference, times, rows)
+    for j in range(q.size):
+        keep[j] = free[j] * law[1][j] + damping[j]
+        mass[j, j] += 0.5 * h * keep[j] + 0.25 * h * h * (free[j] * law[0][j] + stiffness[j])
+        d[j] = h * (tau[j] - bias[j] - taken[j] + keep[j] * (v[j] - u[j]))
+    failed = factorised(mass)
+    if failed >= 0:
+        return NO_BODY, failed
+    solved(mass, d)
+    for j in range(q.size):
+        a[j] = d[j] / h
+    return FINE, -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _steer(turn, s, law, reference, times, rows):  # type: ignore[no-untyped-def]
+    """Fill the law's torque at the predicted state, and which joints may take kp and kd implicitly."""
+    q, v, tau, free, integral, held = rows[0], rows[2], rows[5], rows[8], rows[9], rows[10]
     kp, kd, ki, limit = law
     q_ref, dq_ref, ff = reference
-    n_t, n_v = q_ref.shape
-    h = step / substeps
-    q, u = start[0].copy(), start[1].copy()
-    v, a, d, tau, keep, integral, moved, load = np.zeros((8, n_v))
-    held, before = np.zeros((2, n_v))
-    bias, taken, damping, stiffness = np.zeros((4, n_v))
-    free = np.ones(n_v)
-    bent = np.zeros(passive[0].size)
-    work, mass, checked = np.empty(40 * n_v), np.empty((n_v, n_v)), np.empty((n_v, n_v))
-    for turn in range(-1, n_t):  # the first turn only finds the acceleration at the start
-        k = max(turn, 0)
-        after = min(k + 1, n_t - 1)
-        for s in range(substeps if turn >= 0 else 1):
-            part = s / substeps
-            for j in range(n_v):
-                v[j] = u[j] + 0.5 * h * a[j]
-            _mass_and_load(body, q, v, a, work, bias, mass, load)
-            if s == 0:
-                checked[:] = mass
-                failed = factorised(checked)
-                if failed >= 0:
-                    return NO_BODY, k, failed
-            passive_kernel(*passive, q, v, load, bent, taken, damping, stiffness)
-            steers = hold == 0 or (k * substeps + s) % hold == 0
-            for j in range(n_v):
-                if steers:
-                    e = q_ref[k, j] + part * (q_ref[after, j] - q_ref[k, j]) - q[j]
-                    de = dq_ref[k, j] + part * (dq_ref[after, j] - dq_ref[k, j]) - v[j]
-                    ahead = ff[k, j] + part * (ff[after, j] - ff[k, j])
-                    summed = integral[j] + (0.5 * h * e if hold == 0 else 0.0)  # of the trapezoidal rule
-                    tau[j], free[j] = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * summed, limit[j])
-                    if free[j] > 0.0 or tau[j] * e < 0.0:
-                        integral[j] += h * max(hold, 1) * e
-                    if hold > 0:
-                        free[j], held[j], before[j] = 0.0, tau[j], held[j]
-                        tau[j] = 0.5 * (before[j] + held[j]) if turn > 0 or s > 0 else held[j]
-                elif hold > 0:
-                    tau[j] = held[j]
-                keep[j] = free[j] * kd[j] + damping[j]
-                mass[j, j] += 0.5 * h * keep[j] + 0.25 * h * h * (free[j] * kp[j] + stiffness[j])
-                d[j] = h * (tau[j] - bias[j] - taken[j] + keep[j] * (v[j] - u[j]))
-            if factorised(mass) >= 0:
-                return NO_BODY, k, 0
-            solved(mass, d)
-            for j in range(n_v):
-                a[j] = d[j] / h
-                if turn < 0:
-                    u[j], integral[j] = start[1, j] - 0.5 * d[j], 0.0
-                    continue
-                if s == 0:
-                    out[0, j, k], out[1, j, k], out[2, j, k] = q[j], u[j] + 0.5 * d[j], a[j]
-                    out[3, j, k] = tau[j] - free[j] * kd[j] * (u[j] + 0.5 * d[j] - v[j])
-                u[j] += d[j]
-                moved[j] = h * u[j]
-                q[j] += moved[j]
-                if not abs(u[j]) < RUNAWAY:
-                    return RAN_AWAY, k, j
-            if turn >= 0:
-                _bend(passive, moved, bent)
-    return FINE, -1, -1
+    step, substeps, hold = times
+    k, h, part = max(turn, 0), step / substeps, s / substeps
+    after = min(k + 1, q_ref.shape[0] - 1)
+    if hold > 0 and (k * substeps + s) % hold != 0:
+        tau[:] = held
+        return
+    for j in range(q.size):
+        e = q_ref[k, j] + part * (q_ref[after, j] - q_ref[k, j]) - q[j]
+        de = dq_ref[k, j] + part * (dq_ref[after, j] - dq_ref[k, j]) - v[j]
+        ahead = ff[k, j] + part * (ff[after, j] - ff[k, j])
+        summed = integral[j] + (0.5 * h * e if hold == 0 else 0.0)  # of the trapezoidal rule
+        asked, free[j] = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * summed, limit[j])
+        if turn >= 0 and (free[j] > 0.0 or asked * e < 0.0):
+            integral[j] += h * max(hold, 1) * e
+        tau[j] = asked if hold == 0 or k + s == 0 else 0.5 * (held[j] + asked)
+        free[j] = free[j] if hold == 0 else 0.0
+        held[j] = asked
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _begin(start, rows):  # type: ignore[no-untyped-def]
+    """Place the speed half a step before the start, now that the acceleration there is known."""
+    for j in range(start.shape[1]):
+        rows[1, j] = start[1, j] - 0.5 * rows[4, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _record(rows, law, k, out):  # type: ignore[no-untyped-def]
+    q, u, v, a, d, tau, free = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[8]
+    for j in range(q.size):
+        speed = u[j] + 0.5 * d[j]
+        out[0, j, k], out[1, j, k], out[2, j, k] = q[j], speed, a[j]
+        out[3, j, k] = tau[j] - free[j] * law[1][j] * (speed - v[j])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _move(passive, times, rows, bent):  # type: ignore[no-untyped-def]
+    """Pass a step; return the first joint that runs away, or -1."""
+    q, u, d, moved = rows[0], rows[1], rows[4], rows[11]
+    h = times[0] / times[1]
+    for j in range(q.size):
+        u[j] += d[j]
+        moved[j] = h * u[j]
+        q[j] += moved[j]
+        if not abs(u[j]) < RUNAWAY:
+            return j
+    _bend(passive, moved, bent)
+    return -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def runge_kutta_kernel(body, passive, law, reference, start, times, out):  # type: ignore[no-untyped-def]
     """Simulate by Runge-Kutta steps; see the head of this file."""
-    step, substeps, hold = times
     n_t, n_v = reference[0].shape
-    h = step / substeps
-    state, stage = np.zeros((3, n_v)), np.zeros((3, n_v))  # q, dq, integral
+    h = times[0] / times[1]
+    state, rows = np.zeros((3, n_v)), np.zeros((9, n_v))  # state: q, dq, integral
     state[0], state[1] = start[0], start[1]
-    rate, total = np.zeros((3, n_v)), np.zeros((3, n_v))
-    a, tau, moved = np.zeros((3, n_v))
+    rates = np.zeros((5, 3, n_v))  # of the four stages, behind a row of zeros
+    stage = np.zeros((3, n_v))
     bent, bending = np.zeros(passive[0].size), np.zeros(passive[0].size)
-    rows, load = np.zeros((4, n_v)), np.zeros(n_v)
     work, mass = np.empty(40 * n_v), np.empty((n_v, n_v))
     for k in range(n_t):
-        for s in range(substeps):
+        for s in range(times[1]):
             for place in range(4):
-                ahead = 0.0 if place == 0 else (0.5 if place < 3 else 1.0)
-                for i in range(3):
-                    for j in range(n_v):
-                        stage[i, j] = state[i, j] + ahead * h * rate[i, j]
-                        total[i, j] = 0.0 if place == 0 else total[i, j]
+                ahead = 0.5 * ((place + 1) // 2)
+                stage[:] = state + ahead * h * rates[place]
                 bending[:] = bent
-                for j in range(n_v):
-                    moved[j] = stage[0, j] - state[0, j]
-                _bend(passive, moved, bending)
-                _mass_and_load(body, stage[0], stage[1], a, work, rows[0], mass, load)
-                passive_kernel(*passive, stage[0], stage[1], load, bending, rows[1], rows[2], rows[3])
-                if hold == 0 or (place == 0 and (k * substeps + s) % hold == 0):
-                    _law_torque(law, reference, k, (s + ahead) / substeps, stage, tau, rate)
-                for j in range(n_v):
-                    rate[0, j] = stage[1, j]
-                    rate[1, j] = tau[j] - rows[0, j] - rows[1, j]
-                failed = factorised(mass)
+                rows[6] = stage[0] - state[0]
+                _bend(passive, rows[6], bending)
+                rate = rates[place + 1]
+                failed = _rate(
+                    k, s, ahead, body, passive, law, reference, times, stage, rows, bending, work, mass, rate
+                )
                 if failed >= 0:
                     return NO_BODY, k, failed
-                solved(mass, rate[1])
-                if s == 0 and place == 0:
-                    for j in range(n_v):
-                        out[0, j, k], out[1, j, k] = stage[0, j], stage[1, j]
-                        out[2, j, k], out[3, j, k] = rate[1, j], tau[j]
-                share = (1.0 if place in (0, 3) else 2.0) / 6.0
-                for i in range(3):
-                    for j in range(n_v):
-                        total[i, j] += share * rate[i, j]
-            for j in range(n_v):
-                moved[j] = h * total[0, j]
-                a[j] = total[1, j]
-                for i in range(3):
-                    state[i, j] += h * total[i, j]
-                if not abs(state[1, j]) < RUNAWAY:
-                    return RAN_AWAY, k, j
-            _bend(passive, moved, bent)
+            if s == 0:
+                out[0, :, k], out[1, :, k], out[2, :, k], out[3, :, k] = state[0], state[1], rates[1, 1], rows[7]
+            rates[1] = (rates[1] + 2.0 * rates[2] + 2.0 * rates[3] + rates[4]) / 6.0
+            state += h * rates[1]
+            rows[5], rows[6] = rates[1, 1], h * rates[1, 0]
+            _bend(passive, rows[6], bent)
+            if not np.abs(state[1]).max() < RUNAWAY:
+                return RAN_AWAY, k, int(np.argmax(np.abs(state[1])))
     return FINE, -1, -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _rate(  # type: ignore[no-untyped-def]
+    k, s, ahead, body, passive, law, reference, times, stage, rows, bending, work, mass, rate
+):
+    """Fill the rate of a stage; return the first joint without inertia, or -1."""
+    bias, taken, load, tau = rows[0], rows[1], rows[4], rows[3]
+    substeps, hold = times[1], times[2]
+    _mass_and_load(body, stage[0], stage[1], rows[5], work, bias, mass, load)
+    # The damping and stiffness that the other integrator needs go where nothing is read.
+    passive_kernel(*passive, stage[0], stage[1], load, bending, taken, rows[2], rate[0])
+    rate[2] = rows[8]
+    if hold == 0 or (ahead == 0.0 and (k * substeps + s) % hold == 0):
+        _law_torque(law, reference, k, (s + ahead) / substeps, stage, tau, rate)
+        rows[8] = rate[2]
+    if s == 0 and ahead == 0.0:
+        rows[7] = tau
+    for j in range(tau.size):
+        rate[0, j] = stage[1, j]
+        rate[1, j] = tau[j] - bias[j] - taken[j]
+    failed = factorised(mass)
+    if failed < 0:
+        solved(mass, rate[1])
+    return failed
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})

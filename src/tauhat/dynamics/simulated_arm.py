@@ -138,19 +138,20 @@ def simulated_arm(model: TorqueModel) -> SimulatedArm:
         when a term has no forward dynamics here, naming it.
     """
     bodies, rotors, elements, shapes = [], [], [], []
-    first = 0
+    first, n_v = 0, model.robot.n_v
     for term in model.terms:
         parameters = term.parameters(model.robot)
         for place, parameter in enumerate(parameters):
-            if parameter.symbol in INERTIAL_SYMBOLS:
-                bodies.append((first + place, parameter.joint, INERTIAL_SYMBOLS.index(parameter.symbol)))
-            elif parameter.symbol == _ROTOR:
-                rotors.append((first + place, parameter.joint))
-            else:
-                kinds = _kinds(term)
-                own = place % len(kinds)
-                elements.append((first + place, kinds[own], parameter.joint))
-                shapes.append(_shape(term, parameter.joint, own, model.robot.n_v))
+            index, joint, symbol = first + place, parameter.joint, parameter.symbol
+            if symbol in INERTIAL_SYMBOLS:
+                bodies.append((index, joint, INERTIAL_SYMBOLS.index(symbol)))
+                continue
+            if symbol == _ROTOR:
+                rotors.append((index, joint))
+                continue
+            kinds = _kinds(term)
+            elements.append((index, kinds[place % len(kinds)], joint))
+            shapes.append(_shape(term, joint, place % len(kinds), n_v))
         first += len(parameters)
     return SimulatedArm(
         model=model,

@@ -84,8 +84,11 @@ class Estimate:
     rank, condition : of the scaled regressor
     inputs : the recordings it was fitted on
     structure : how the terms were chosen, when they were
+    top_speeds : (n_v,) of the joints in these recordings [rad/s or m/s]; friction at higher speeds is extrapolated
     standard : (n_p,) all standard parameters, where they were identified under physical constraints
     physical : what these constraints were, what they cost and what proves the solution
+    passes : how often the problem was solved
+    cause, advice : why the method stopped, and what to do about it, in words
     version : of the library that wrote it
     """
 
@@ -102,8 +105,12 @@ class Estimate:
     condition: float
     inputs: tuple[InputLog, ...]
     structure: Structure | None = None
+    top_speeds: FloatArray | None = None
     standard: FloatArray | None = None
     physical: Mapping[str, Any] | None = None
+    passes: int = 1
+    cause: str = "solved"
+    advice: str = ""
     version: str = tauhat.__version__
 
     def __post_init__(self) -> None:
@@ -116,6 +123,8 @@ class Estimate:
         }
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape, where="estimate"))
+        if self.top_speeds is not None:
+            object.__setattr__(self, "top_speeds", frozen("top_speeds", self.top_speeds, (n_v,), where="estimate"))
         if self.standard is not None:
             standard = frozen("standard", self.standard, (len(self.base.names),), where="estimate")
             object.__setattr__(self, "standard", standard)
@@ -230,6 +239,9 @@ class Estimate:
                 "rank": self.rank,
                 "condition": self.condition if np.isfinite(self.condition) else None,
                 "degrees": self.degrees,
+                "passes": self.passes,
+                "cause": self.cause,
+                "advice": self.advice,
             },
             "structure": None if self.structure is None else self.structure.to_dict(),
             "processing": self.processing.to_dict(),
@@ -241,6 +253,7 @@ class Estimate:
                 "unidentifiable": self.base.unidentifiable.tolist(),
                 "regrouping": self.base.regrouping.tolist(),
             },
+            "top_speeds": None if self.top_speeds is None else self.top_speeds.tolist(),
             "values": self.values.tolist(),
             "covariance": self.covariance.tolist(),
             "standard": None if self.standard is None else self.standard.tolist(),
@@ -318,8 +331,12 @@ def estimate_from_dict(data: Mapping[str, Any]) -> Estimate:
         rank=int(fit["rank"]),
         condition=np.inf if fit["condition"] is None else float(fit["condition"]),
         structure=Structure.from_dict(data["structure"]) if data.get("structure") else None,
+        top_speeds=data.get("top_speeds"),
         standard=data.get("standard"),
         physical=data.get("physical"),
+        passes=int(fit.get("passes", 1)),
+        cause=str(fit.get("cause", "solved")),
+        advice=str(fit.get("advice", "")),
         inputs=tuple(InputLog(**{**log, "rows": tuple(log["rows"])}) for log in data["inputs"]),
         version=str(data["tauhat_version"]),
     )

@@ -14,9 +14,9 @@ from tauhat.estimation.total_least_squares import TotalLeastSquares
 _METHODS: tuple[type[Estimator], ...] = (
     OrdinaryLeastSquares,
     WeightedLeastSquares,
+    CauchyLeastSquares,
     HuberLeastSquares,
     BisquareLeastSquares,
-    CauchyLeastSquares,
     TotalLeastSquares,
     RidgeLeastSquares,
     PriorLeastSquares,

@@ -17,7 +17,7 @@ Source: Han, Wu, Liu, Xiong, "An iterative approach for accurate dynamic model i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -28,23 +28,26 @@ from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.terms import ShapedTerm
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence, collect_all
+from tauhat.estimation.losses import Cauchy, Loss
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.repeated_rows import repeated_rows
 from tauhat.estimation.robust import ReweightedLeastSquares, mended
 from tauhat.estimation.rows import Rows
 from tauhat.estimation.shapes import chosen_form
 
-WIDER = (0.5, 0.7, 1.0, 1.4, 2.0)  # of the present shape: where another is looked for, and again more closely
+WIDER = (0.6, 1.0, 1.7)  # of the present shape: where another is looked for, and again more closely
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HybridLeastSquares(ReweightedLeastSquares):
     """Reweighted least squares whose shapes of friction follow the weights.
 
+    loss : of the scaled residuals, Cauchy's by default
     rounds : of shapes and weights, at most
     """
 
     key: ClassVar[str] = "hybrid"
+    loss: Loss = field(default_factory=Cauchy)
     rounds: int = 3
 
     def __post_init__(self) -> None:

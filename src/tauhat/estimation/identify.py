@@ -90,6 +90,7 @@ def _estimate(problem: Problem, solution: Solution, method: Estimator) -> Estima
         processing=problem.processing,
         estimator={"name": method.key, **method.settings()},
         inputs=tuple(input_log(recording) for recording in problem.recordings),
+        top_speeds=top_speeds(problem.recordings),
         **{name: getattr(solution, name) for name in kept},
     )
 

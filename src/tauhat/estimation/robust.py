@@ -203,7 +203,7 @@ class ReweightedLeastSquares(Estimator, ABC):
 class HuberLeastSquares(ReweightedLeastSquares):
     """Reweighting by Huber's loss: one minimum, and large residuals still pull, all with the same force."""
 
-    key: ClassVar[str] = "irls"
+    key: ClassVar[str] = "irls-huber"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -216,9 +216,13 @@ class BisquareLeastSquares(ReweightedLeastSquares):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CauchyLeastSquares(ReweightedLeastSquares):
-    """Reweighting by Cauchy's loss: the farther a residual, the weaker its pull, never quite none."""
+    """Reweighting by Cauchy's loss: the farther a residual, the weaker its pull, never quite none.
 
-    key: ClassVar[str] = "irls-cauchy"
+    The default of the three: outliers that last cost it next to nothing, which Huber's cannot say, and where all rows
+    are hard to explain it drops none of them, which Tukey's does.
+    """
+
+    key: ClassVar[str] = "irls"
     loss: Loss = field(default_factory=Cauchy)
 
 

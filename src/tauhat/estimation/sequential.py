@@ -1,7 +1,8 @@
 """Sequential identification: friction first, from segments in which it shows by itself; then inertia on the rest.
 
 1. Runs at constant speed in both directions and reversals are found in the recordings (`segments`).
-2. Friction parameters x_F are fitted to them alone: to half the differences of paired runs, `(W+ - W-) x_F / 2`, and to
+2. Friction parameters x_F are fitted to them alone, those that they tell (a standard error below half the value;
+   reversals alone say nothing of viscous friction): to half the differences of paired runs, `(W+ - W-) x_F / 2`, and to
    what is left of torque and columns about a reversal after a parabola in time is taken out of both.
 3. All other parameters are fitted to all rows with friction held, `W_R x_R = tau - W_F x_F`; the error of x_F goes on
    into x_R by `-(W_R'W_R)^-1 W_R'W_F`.
@@ -38,6 +39,7 @@ from tauhat.estimation.segments import (
 )
 from tauhat.estimation.solution import Solution, joint_residuals, joint_torques, rank_and_condition
 
+LOOSE = 0.5  # standard error over value above which a friction parameter is left to the second step
 _SILENT = 1e-9  # a column below this part of the largest is not told by the segments
 
 
@@ -68,7 +70,7 @@ class SequentialFit:
     """Friction from segments, the rest with friction held, and the joint fit beside it.
 
     maps : of friction, one a joint
-    friction : indices of the base parameters that were fitted to the segments
+    friction : indices of the base parameters that were fitted to the segments; others they do not tell
     solution : of both steps
     together : of the joint fit
     pairs, turns : how many pairs of runs and reversals were found
@@ -113,8 +115,7 @@ def identify_sequentially(
     pairs = list(contrasts(runs, rules=rules))
     turns = [turn for track in found for turn in reversals(track, tops, rules=rules)]
     _require_segments(problem, pairs, turns)
-    evidence, own = _friction_evidence(problem, pairs, turns)
-    first = method.fit(evidence)
+    own, first = _first_step(*_friction_evidence(problem, pairs, turns), method)
     return SequentialFit(
         maps=tuple(_map(joint, pairs, turns, problem.processing.cutoff) for joint in range(tops.size)),
         friction=own,
@@ -170,6 +171,21 @@ def _friction_evidence(
     supports = tuple(np.flatnonzero(np.isin(own, support)) for support in problem.evidence.supports)
     blocks = tuple(_block(joint, part[:, [*own, -1]], supports, n_v) for joint, part in rows)
     return Evidence(supports=supports, n_b=int(own.size), blocks=blocks, recordings=("segments",)), own
+
+
+def _first_step(evidence: Evidence, own: IntArray, method: Estimator) -> tuple[IntArray, Solution]:
+    """Return the friction parameters that the segments tell and their fit; the least certain goes until all are."""
+    kept = np.arange(own.size)
+    while kept.size:
+        solution = method.fit(evidence.keeping(kept))
+        relative = np.sqrt(np.diag(solution.covariance)) / np.maximum(np.abs(solution.values), np.finfo(float).tiny)
+        if relative.max() <= LOOSE:
+            return own[kept], solution
+        kept = np.delete(kept, int(relative.argmax()))
+    raise ModelError(
+        "the segments tell no friction parameter to half its value",
+        remedy="record runs at constant speed, several speeds, both ways",
+    )
 
 
 def _block(joint: int, rows: FloatArray, supports: tuple[IntArray, ...], n_v: int) -> Block:

@@ -1,9 +1,8 @@
 """Damping and dry friction that come nearest to an identified model's friction, for programs that know nothing else.
 
-The model's friction in steady motion is compared at speeds up to the joint's limit, each weighed with its own standard
-error: beyond the recorded speeds it is an extrapolation, and counts for less. Neither number may become negative. The
-load of load-dependent friction is the mean of gravity over the poses inside the limits: the zero pose of many arms
-is the stretched one, whose load is the largest of all.
+The model's friction in steady motion is compared at speeds up to the recorded top speed, each weighed with its own
+standard error. Neither number may become negative. The load of load-dependent friction is the mean of gravity over the
+poses inside the limits: the zero pose of many arms is the stretched one, whose load is the largest of all.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ def fitted_friction(estimate: Estimate, parameters: StandardParameters, *, stand
     """Return damping and dry friction of the laws in `parameters`, exact where they are viscous and Coulomb friction.
 
     Otherwise both minimise `sum_k ((damping v_k + dry - f(v_k)) / error_k)^2`, neither negative, over 5 to 100 % of the
-    joint's speed limit, of 1 rad/s or m/s where it has none.
+    joint's top speed in the fitted recordings (an old estimate does not know it: of its limit, or 1 rad/s or m/s).
 
     Parameters
     ----------
@@ -47,7 +46,7 @@ def fitted_friction(estimate: Estimate, parameters: StandardParameters, *, stand
     is_textbook = {law.key for law in parameters.friction} <= _TEXTBOOK and parameters.motors is None
     if is_textbook and min((part.min() for part in coefficients), default=0.0) >= 0.0:
         return own
-    speeds = _PARTS[:, None] * top_speeds(estimate.robot)
+    speeds = _PARTS[:, None] * _fastest(estimate)
     unloaded = _without_load(estimate, parameters, standard)
     steady = [unloaded.friction(row) for row in speeds]
     torque = np.array([one.torque for one in steady]) + _of_mean_load(estimate.robot, parameters, speeds)
@@ -67,6 +66,14 @@ def _without_load(estimate: Estimate, parameters: StandardParameters, standard: 
     terms = [term for term in estimate.model.terms for _ in term.parameters(estimate.robot)]
     kept = np.where([term.key in absent for term in terms], 0.0, standard)
     return replace(estimate, values=estimate.base.projection @ kept, standard=kept)
+
+
+def _fastest(estimate: Estimate) -> FloatArray:
+    """Return the top speed of each joint in the fitted recordings, its limit where none is known."""
+    limits = top_speeds(estimate.robot)
+    if estimate.top_speeds is None:
+        return limits
+    return np.where(estimate.top_speeds > 0.0, estimate.top_speeds, limits)
 
 
 def _of_mean_load(robot: Robot, parameters: StandardParameters, speeds: FloatArray) -> FloatArray:

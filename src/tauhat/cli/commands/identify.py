@@ -46,7 +46,9 @@ class Options:
     ]
     map_file: MapOption = None
     model: FittedModelOption = "robust"
-    estimator: Annotated[str, typer.Option("--estimator", metavar="NAME", help="Method of the fit; an unknown name lists all.")] = "wls"
+    estimator: Annotated[
+        str, typer.Option("--estimator", metavar="NAME", help="Method of the fit; an unknown name lists all.")
+    ] = "wls"
     physical: Annotated[
         bool,
         typer.Option("--physical", help="Keep every link a possible body, friction positive; gives all parameters."),

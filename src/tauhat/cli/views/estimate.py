@@ -45,6 +45,7 @@ def _friction_table(estimate: Estimate) -> RenderableType:
     from rich.markup import escape
 
     limits = np.where(np.isfinite(estimate.robot.velocity_limit), estimate.robot.velocity_limit, 1.0)
+    limits = limits if estimate.top_speeds is None else estimate.top_speeds
     levels = [(part, estimate.friction(part * np.where(limits > 0, limits, 1.0))) for part in _SPEEDS]
     headers, columns = [], []
     for part, friction in levels:
@@ -60,7 +61,7 @@ def _friction_table(estimate: Estimate) -> RenderableType:
 def _sentences(estimate: Estimate) -> RenderableType:
     from rich.text import Text
 
-    lines = (_terms(estimate), _source(estimate), _trust(estimate), _physics(estimate))
+    lines = (_terms(estimate), _source(estimate), _method(estimate), _trust(estimate), _physics(estimate))
     return Text("".join(f"{line}\n" for line in lines if line))
 
 
@@ -78,6 +79,14 @@ def _source(estimate: Estimate) -> str:
         f"From {logs} of {sum(log.seconds for log in inputs):.1f} s; low-pass {processing.cutoff:.3g} Hz, "
         f"of the motion {processing.motion_cutoff:.3g} Hz; velocity from the measured {processing.velocity}{delay}."
     )
+
+
+def _method(estimate: Estimate) -> str:
+    """Return why the method stopped and what it advises; nothing where there is nothing to say."""
+    if estimate.cause == "solved" and not estimate.advice:
+        return ""
+    advice = f"; {estimate.advice}" if estimate.advice else ""
+    return f"Method {estimate.estimator['name']}: {estimate.cause}{advice}."
 
 
 def _trust(estimate: Estimate) -> str:

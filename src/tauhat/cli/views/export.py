@@ -18,7 +18,7 @@ def export_view(document: Mapping[str, Any]) -> Iterator[RenderableType]:
     """Yield how near damping and dry friction come to the model's, and each file with what it does not say."""
     if document["approximations"]:
         yield _friction_table(document["approximations"])
-        yield "Deviations in steady motion, the largest at 5 to 100 % of the speed limit (1 rad/s or m/s without one)."
+        yield "Deviations in steady motion, the largest at 5 to 100 % of the recorded top speed."
     if document["without"]:
         yield f"Left out as asked: {', '.join(document['without'])}."
     for name in _FORMATS:

@@ -14,6 +14,8 @@ from tauhat.errors import ModelError
 from tauhat.estimation.evidence import collect_all
 from tauhat.estimation.filters.samples import units_of
 from tauhat.estimation.least_squares import WeightedLeastSquares
+from tauhat.estimation.physical import consistent
+from tauhat.estimation.physical_constraints import PhysicalConstraints
 from tauhat.estimation.problem import Problem
 from tauhat.recordings.recording import FEWEST_SAMPLES, Recording
 
@@ -56,7 +58,7 @@ class Diffuse(Beginning):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FirstStretch(Beginning):
-    """Weighted least squares on the first part of every recording; the filter sees only the rest.
+    """Weighted least squares on the first part of every recording, physically consistent; the filter sees the rest.
 
     Only the standard errors are taken from that fit: what a short stretch says of correlations is often a false
     certainty, and a filter never forgets it.
@@ -88,7 +90,10 @@ class FirstStretch(Beginning):
         evidence = collect_all(problem.model, problem.base, first, problem.processing)
         solution = WeightedLeastSquares(power=1.0).fit(evidence)
         rest = tuple(recording.rows(cut, recording.n_t) for recording, cut in pairs)
-        return Start(solution.values, np.diag(self.widened**2 * np.diag(solution.covariance)), rest)
+        found = consistent(
+            evidence, problem.model, problem.base, weights=solution.weights, constraints=PhysicalConstraints()
+        )
+        return Start(found.values, np.diag(self.widened**2 * np.diag(solution.covariance)), rest)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,16 +1,21 @@
 """Kalman filters over state and parameters at once: torque drives the simulated arm, the encoders correct it.
 
-State `(q, dq, x)` with the base parameters x constant. One step h of the clock, by the midpoint rule,
+State `(q, dq, x)` with the base parameters x constant. Positions are measured every T; the torque between them drives
+the arm in steps of h, by the midpoint rule,
 
     a = ddq(q, dq, tau; x)      b = ddq(q + h dq/2 + h^2 a/8, dq + h a/2, tau; x)
     q+ = q + h dq + h^2 b/2     dq+ = dq + h b     x+ = x
 
-Torque noise s_j enters as an acceleration `M^-1 diag(s)`, and is added to the covariance by the columns
-`[h^2/2; h; 0] M^-1 diag(s)`. Measured are positions, or positions and velocities.
+Torque noise of deviation s, of the mean over T, enters as an acceleration `M^-1 diag(s)` and is added to the covariance
+by the columns `[T^2/2; T; 0] M^-1 diag(s)`. Measured are positions, or positions and velocities.
+
+That the measured torque is an input is the method's weak side: its noise is also in the predicted acceleration, by
+which the filter judges the inertias, and pulls them up, by about the torque's noise over its signal squared. The noise
+of a mean falls with the time it is taken over, hence T is much longer than h.
 
 Noise, where not given: that of positions and velocities from their fourth differences, at least a third of an encoder
-count; that of the torque from the residual r of weighted least squares on rows low-passed at f_c, as the white noise on
-the step's clock that leaves as much there, `s = r / sqrt(2 h f_c)`. Model error thus counts as noise.
+count; that of the torque from the residual r of weighted least squares on rows low-passed at f_c, as the mean over T of
+white noise that leaves as much there, `s = r / sqrt(2 T f_c)`. Model error thus counts as noise.
 
 Source: Gautier, Poignet, "Extended Kalman filtering and weighted least squares dynamic identification of robot", 2001.
 """
@@ -48,7 +53,7 @@ _LEAST = 1e-9  # [rad, m and per second] noise of a recording without any
 class StateNoise:
     """Standard deviations of white noise; empty where they are to be taken from the recordings.
 
-    torque : (n_v,) per step of the filter's clock [Nm or N]
+    torque : (n_v,) of the mean between two measurements [Nm or N]
     position, velocity : (n_v,) [rad or m, and per second]
     """
 
@@ -67,7 +72,7 @@ class StateNoise:
 
 
 class StateSample(NamedTuple):
-    """One step: time of its end [s], mean torque over it (n_v,), what is measured at its end (n_y,)."""
+    """From one measurement to the next: time of the latter [s], torque of every step (n, n_v), measurement (n_y,)."""
 
     t: float
     tau: FloatArray
@@ -78,8 +83,8 @@ class StateSystem(NamedTuple):
     """What a step needs beside belief and sample.
 
     accelerations : of the model
-    step : [s]
-    torque_noise : (n_v,) deviations
+    step : of the integration [s]
+    torque_noise : (n_v,) deviations of the mean torque between two measurements
     noise : (n_y, n_y) root of the measurement's covariance
     """
 
@@ -92,7 +97,7 @@ class StateSystem(NamedTuple):
 def state_step(
     kalman: KalmanFilter, system: StateSystem, belief: Belief, sample: StateSample
 ) -> tuple[Belief, Innovation]:
-    """Return the belief over `(q, dq, x)` after one step of the clock and its measurement.
+    """Return the belief over `(q, dq, x)` at the next measurement, and after it.
 
     Raises
     ------
@@ -106,23 +111,25 @@ def state_step(
 
 
 def _moved(system: StateSystem, points: FloatArray, tau: FloatArray) -> FloatArray:
-    """Return the points one step on."""
-    n_v, h = tau.size, system.step
+    """Return the points one measurement on."""
+    n_v, h = tau.shape[1], system.step
     q, dq, values = points[:, :n_v], points[:, n_v : 2 * n_v], points[:, 2 * n_v :]
-    drive = np.broadcast_to(tau, q.shape)
-    first = system.accelerations.at(q, dq, drive, values)
-    middle = system.accelerations.at(q + 0.5 * h * dq + 0.125 * h**2 * first, dq + 0.5 * h * first, drive, values)
-    return np.hstack([q + h * dq + 0.5 * h**2 * middle, dq + h * middle, values])
+    for own in tau:
+        drive = np.broadcast_to(own, q.shape)
+        first = system.accelerations.at(q, dq, drive, values)
+        middle = system.accelerations.at(q + 0.5 * h * dq + 0.125 * h**2 * first, dq + 0.5 * h * first, drive, values)
+        q, dq = q + h * dq + 0.5 * h**2 * middle, dq + h * middle
+    return np.hstack([q, dq, values])
 
 
 def _driven(system: StateSystem, mean: FloatArray, tau: FloatArray) -> FloatArray:
-    """Return the columns by which torque noise moves the state in one step, (n_x, n_v)."""
-    n_v, h = tau.size, system.step
-    drives = np.vstack([tau, tau + np.diag(system.torque_noise)])
+    """Return the columns by which torque noise moves the state until the next measurement, (n_x, n_v)."""
+    n_v, time = tau.shape[1], tau.shape[0] * system.step
+    drives = np.vstack([tau[0], tau[0] + np.diag(system.torque_noise)])
     points = np.broadcast_to(mean, (n_v + 1, mean.size))
     found = system.accelerations.at(points[:, :n_v], points[:, n_v : 2 * n_v], drives, points[:, 2 * n_v :])
     moved = (found[1:] - found[0]).T
-    return np.vstack([0.5 * h**2 * moved, h * moved, np.zeros((mean.size - 2 * n_v, n_v))])
+    return np.vstack([0.5 * time**2 * moved, time * moved, np.zeros((mean.size - 2 * n_v, n_v))])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +139,8 @@ class StateKalman(Recursion):
     filter : spreading and form
     beginning : weighted least squares on the first part of each recording by default
     noise : from the recordings by default
-    rate : the clock is thinned to it, the torque averaged over each step [Hz]
+    rate : of the measurements at most [Hz]
+    longest_step : of the integration; the torque is averaged over each step [s]
     test : what stops it
 
     Velocities are measurements where the recording has them and the processing takes them.
@@ -142,13 +150,16 @@ class StateKalman(Recursion):
     filter: KalmanFilter = field(default_factory=KalmanFilter)
     beginning: Beginning = field(default_factory=FirstStretch)
     noise: StateNoise = field(default_factory=StateNoise)
-    rate: float = 250.0
+    rate: float = 50.0
+    longest_step: float = 4e-3
     test: InnovationTest = field(default_factory=InnovationTest)
 
     def __post_init__(self) -> None:
         super(StateKalman, self).__post_init__()
-        if not 0.0 < self.rate < np.inf:
-            raise ModelError("rate of the filter's clock", expected="a positive frequency", got=f"{self.rate} Hz")
+        for name in ("rate", "longest_step"):
+            value = getattr(self, name)
+            if not 0.0 < value < np.inf:
+                raise ModelError(f"state filter: {name}", expected="a positive number", got=value)
 
     @single_threaded
     def fit_problem(self, problem: Problem) -> Solution:
@@ -193,14 +204,14 @@ class StateKalman(Recursion):
     def _plan(
         self, problem: Problem, recording: Recording, accelerations: PointAccelerations, residual: FloatArray
     ) -> _Plan:
-        clocked = _clocked(recording, problem.processing.delay, self.rate)
+        clocked = _clocked(recording, problem.processing.delay, rate=self.rate, longest=self.longest_step)
         velocities = recording.dq is not None and problem.processing.velocity == "velocity"
         position = self.noise.chosen("position", _measurement_noise(recording.q))
-        torque = residual / np.sqrt(2.0 * clocked.step * min(problem.processing.cutoff, 0.5 / clocked.step))
-        rise = max(1, round(_RUN_UP / clocked.step))
-        speed = (clocked.q[rise] - clocked.q[0]) / (rise * clocked.step)
-        change = np.abs(clocked.q[2 * rise] - 2.0 * clocked.q[rise] + clocked.q[0]) / (rise * clocked.step)
-        unsure = 2.0 * position / (rise * clocked.step) + change + _LEAST
+        torque = residual / np.sqrt(2.0 * clocked.time * min(problem.processing.cutoff, 0.5 / clocked.time))
+        rise = max(1, round(_RUN_UP / clocked.time))
+        speed = (clocked.q[rise] - clocked.q[0]) / (rise * clocked.time)
+        change = np.abs(clocked.q[2 * rise] - 2.0 * clocked.q[rise] + clocked.q[0]) / (rise * clocked.time)
+        unsure = 2.0 * position / (rise * clocked.time) + change + _LEAST
         measured, noise = clocked.q, position
         if velocities and clocked.dq is not None:
             own = self.noise.chosen("velocity", _measurement_noise(clocked.dq))
@@ -221,8 +232,14 @@ class _Plan(NamedTuple):
 
 
 class _Clocked(NamedTuple):
-    """A recording on a coarser clock: step [s], (n,), and (n, n_v) each; `tau[k]` is the mean from k to k + 1."""
+    """A recording on a coarser clock.
 
+    time, step : between measurements, and of the integration [s]
+    t, q, dq : (n,), (n, n_v) each, at the measurements
+    tau : (n - 1, n_steps, n_v) means over each step between them
+    """
+
+    time: float
     step: float
     t: FloatArray
     q: FloatArray
@@ -230,19 +247,21 @@ class _Clocked(NamedTuple):
     tau: FloatArray
 
 
-def _clocked(recording: Recording, delay: float, rate: float) -> _Clocked:
+def _clocked(recording: Recording, delay: float, *, rate: float, longest: float) -> _Clocked:
     clock = uniform_clock(recording, delay)
-    every = max(1, round(1.0 / (rate * clock.step)))
+    ticks_a_step = max(1, int(longest / clock.step + 1e-9))
+    n_steps = max(1, round(1.0 / (rate * clock.step * ticks_a_step)))
+    every = n_steps * ticks_a_step
     count = (clock.n_t - 1) // every
     ticks = clock.ticks(0, count * every + 1)
     if recording.tau is None:
         raise ModelError("no torque in the log", where=recording.name)
     torque = interpolated(recording.t, recording.tau, ticks[:-1] + 0.5 * clock.step)
-    mean = torque.reshape(recording.n_v, count, every).mean(axis=2).T
+    mean = torque.reshape(recording.n_v, count, n_steps, ticks_a_step).mean(axis=3).transpose(1, 2, 0)
     coarse = ticks[::every]
     q = interpolated(recording.t, unwrapped(recording.q), coarse + delay).T
     dq = None if recording.dq is None else interpolated(recording.t, recording.dq, coarse + delay).T
-    return _Clocked(every * clock.step, coarse, q, dq, mean)
+    return _Clocked(every * clock.step, ticks_a_step * clock.step, coarse, q, dq, mean)
 
 
 def _measurement_noise(signal: FloatArray) -> FloatArray:
