@@ -36,12 +36,11 @@ from tauhat.estimation import (
     OrdinaryLeastSquares,
     Solution,
     WeightedLeastSquares,
-    collect,
     estimator_named,
 )
 from tauhat.estimation.evidence import evidence_from_rows
 from tauhat.estimation.problem import Problem
-from tauhat.estimation.repeated_rows import remembered
+from tauhat.estimation.rows import Rows, filtered_rows
 from tauhat.excitation import random_fourier
 from tauhat.recordings import Processing, Recording
 from tauhat.robots import load_robot
@@ -111,11 +110,14 @@ def outliers(condition: str, size: np.ndarray, tau: np.ndarray, rng: np.random.G
 
 
 def problem_of(truth: Truth, recording: Recording) -> Problem:
-    evidence = collect(truth.model, truth.base, recording, PROCESSING)
-    bare = Problem(
-        model=truth.model, base=truth.base, recordings=(recording,), processing=PROCESSING, evidence=evidence
-    )
-    return remembered(bare)
+    """The problem of one recording with its rows, which all methods share."""
+    layout = truth.model.layout(truth.base.independent)
+    pieces = list(filtered_rows(truth.model, layout, recording, PROCESSING))
+    rows = Rows(*(np.concatenate(parts, axis=-1) for parts in zip(*pieces, strict=True)))
+    return Problem(
+        model=truth.model, base=truth.base, recordings=(recording,), processing=PROCESSING,
+        evidence=evidence_from_rows(layout, truth.base, [rows]), kept=(rows,),
+    )  # fmt: skip
 
 
 def with_noisy_columns(truth: Truth, problem: Problem, rng: np.random.Generator) -> Problem:

@@ -9,8 +9,8 @@ import pytest
 
 from sample_arms import chain, planar_arm, random_states, smooth_motion
 from tauhat.dynamics import Inertia, Motion, TorqueModel, base_parameters, inverse_dynamics, motion_from_rows, regressor
-from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
 from tauhat.dynamics.small_terms import without_small_terms
+from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
 from tauhat.errors import ModelError
 from tauhat.robots import load_robot
 

@@ -1,5 +1,5 @@
 # ruff: noqa: ARG002 (the terms here take what every term takes)
-"""The Term interface carries what later models need: states along a recording, parameters of a pass before, coupled joints."""
+"""The Term interface carries what models need: states along a recording, loads of a pass before, coupled joints."""
 
 from __future__ import annotations
 
@@ -65,7 +65,9 @@ def smooth_stretch(n_t: int) -> Motion:
     return Motion(q=q.T.copy(), dq=dq.T.copy(), ddq=ddq.T.copy(), step=0.005)
 
 
-MODEL = TorqueModel(robot=planar_arm(), terms=(Inertia(), BristleFriction(), LoadCoulomb(widths=(0.05, 0.05)), WristCoupling()))
+MODEL = TorqueModel(
+    robot=planar_arm(), terms=(Inertia(), BristleFriction(), LoadCoulomb(widths=(0.05, 0.05)), WristCoupling())
+)
 
 
 @settings(max_examples=15)

@@ -3,6 +3,7 @@
 from tauhat.dynamics.barycentric import BarycentricParameters, barycentric_parameters
 from tauhat.dynamics.base import BaseParameters, base_parameters, random_motion
 from tauhat.dynamics.closed_form_base import closed_form_base
+from tauhat.dynamics.forward import Masses, forward_dynamics, rotor_mass_matrix
 from tauhat.dynamics.model import PLAIN_TERMS, ROBUST_TERMS, TERMS, TorqueModel, torque_model
 from tauhat.dynamics.model_file import load_model
 from tauhat.dynamics.motion import Motion, motion_from_rows
@@ -20,6 +21,7 @@ __all__ = [
     "Coulomb",
     "Inertia",
     "InertiaWithoutProducts",
+    "Masses",
     "Motion",
     "Offset",
     "Parameter",
@@ -31,6 +33,7 @@ __all__ = [
     "base_parameters",
     "bias_torque",
     "closed_form_base",
+    "forward_dynamics",
     "gravity_torque",
     "inverse_dynamics",
     "load_model",
@@ -38,6 +41,7 @@ __all__ = [
     "motion_from_rows",
     "random_motion",
     "regressor",
+    "rotor_mass_matrix",
     "torque_model",
     "without_small_terms",
 ]

@@ -154,23 +154,13 @@ def runge_kutta_kernel(body, passive, law, reference, start, times, out):  # typ
     state, rows = np.zeros((3, n_v)), np.zeros((9, n_v))  # state: q, dq, integral
     state[0], state[1] = start[0], start[1]
     rates = np.zeros((5, 3, n_v))  # of the four stages, behind a row of zeros
-    stage = np.zeros((3, n_v))
-    bent, bending = np.zeros(passive[0].size), np.zeros(passive[0].size)
+    bent = np.zeros(passive[0].size)
     work, mass = np.empty(40 * n_v), np.empty((n_v, n_v))
     for k in range(n_t):
         for s in range(times[1]):
-            for place in range(4):
-                ahead = 0.5 * ((place + 1) // 2)
-                stage[:] = state + ahead * h * rates[place]
-                bending[:] = bent
-                rows[6] = stage[0] - state[0]
-                _bend(passive, rows[6], bending)
-                rate = rates[place + 1]
-                failed = _rate(
-                    k, s, ahead, body, passive, law, reference, times, stage, rows, bending, work, mass, rate
-                )
-                if failed >= 0:
-                    return NO_BODY, k, failed
+            failed = _stages(k, s, body, passive, law, reference, times, state, rows, bent, work, mass, rates)
+            if failed >= 0:
+                return NO_BODY, k, failed
             if s == 0:
                 out[0, :, k], out[1, :, k], out[2, :, k], out[3, :, k] = state[0], state[1], rates[1, 1], rows[7]
             rates[1] = (rates[1] + 2.0 * rates[2] + 2.0 * rates[3] + rates[4]) / 6.0
@@ -180,6 +170,25 @@ def runge_kutta_kernel(body, passive, law, reference, start, times, out):  # typ
             if not np.abs(state[1]).max() < RUNAWAY:
                 return RAN_AWAY, k, int(np.argmax(np.abs(state[1])))
     return FINE, -1, -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _stages(  # type: ignore[no-untyped-def]
+    k, s, body, passive, law, reference, times, state, rows, bent, work, mass, rates
+):
+    """Fill the rates of the four stages; return the first joint without inertia, or -1."""
+    h = times[0] / times[1]
+    for place in range(4):
+        ahead = 0.5 * ((place + 1) // 2)
+        stage = state + ahead * h * rates[place]
+        bending = bent.copy()
+        rows[6] = stage[0] - state[0]
+        _bend(passive, rows[6], bending)
+        rate = rates[place + 1]
+        failed = _rate(k, s, ahead, body, passive, law, reference, times, stage, rows, bending, work, mass, rate)
+        if failed >= 0:
+            return failed
+    return -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})

@@ -1,5 +1,7 @@
 """Evidence, estimators and the estimate."""
 
+from tauhat.estimation.closed_loop import ClosedLoop, SampledReference
+from tauhat.estimation.didim import DirectInverse
 from tauhat.estimation.drives import DriveCalibration, DriveGains, WeighedPayload, calibrate_drives
 from tauhat.estimation.essential import EssentialLeastSquares, EssentialParameters, EssentialStep, essential_parameters
 from tauhat.estimation.estimate import Estimate, InputLog, ParameterRow, load_estimate
@@ -7,9 +9,11 @@ from tauhat.estimation.estimators import ESTIMATORS, estimator_named
 from tauhat.estimation.evidence import Evidence, collect, collect_all
 from tauhat.estimation.hybrid import HybridLeastSquares
 from tauhat.estimation.identify import identify
+from tauhat.estimation.idim_iv import InstrumentalVariables
 from tauhat.estimation.least_squares import Estimator, OrdinaryLeastSquares, WeightedLeastSquares
 from tauhat.estimation.losses import Bisquare, Cauchy, Huber, Loss
 from tauhat.estimation.maximum_likelihood import MaximumLikelihood
+from tauhat.estimation.output_error import ClosedLoopInputError, ClosedLoopOutputError
 from tauhat.estimation.payload import KnownPayload, Payload, identify_payload
 from tauhat.estimation.payload_body import Body
 from tauhat.estimation.physical import ConsistentSolution, consistent
@@ -38,7 +42,11 @@ __all__ = [
     "Box",
     "Cauchy",
     "CauchyLeastSquares",
+    "ClosedLoop",
+    "ClosedLoopInputError",
+    "ClosedLoopOutputError",
     "ConsistentSolution",
+    "DirectInverse",
     "DriveCalibration",
     "DriveGains",
     "Ellipsoid",
@@ -54,6 +62,7 @@ __all__ = [
     "HuberLeastSquares",
     "HybridLeastSquares",
     "InputLog",
+    "InstrumentalVariables",
     "KnownPayload",
     "LearnedResidual",
     "LinkConstraints",
@@ -68,6 +77,7 @@ __all__ = [
     "RecursiveLeastSquares",
     "ResidualNetwork",
     "RidgeLeastSquares",
+    "SampledReference",
     "Solution",
     "Structure",
     "TotalLeastSquares",

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from tauhat.errors import ModelError
+from tauhat.estimation.didim import DirectInverse
 from tauhat.estimation.hybrid import HybridLeastSquares
+from tauhat.estimation.idim_iv import InstrumentalVariables
 from tauhat.estimation.least_squares import Estimator, OrdinaryLeastSquares, WeightedLeastSquares
 from tauhat.estimation.maximum_likelihood import MaximumLikelihood
+from tauhat.estimation.output_error import ClosedLoopInputError, ClosedLoopOutputError
 from tauhat.estimation.prior import PriorLeastSquares, RidgeLeastSquares
 from tauhat.estimation.recursive import RecursiveLeastSquares
 from tauhat.estimation.robust import BisquareLeastSquares, CauchyLeastSquares, HuberLeastSquares
@@ -23,6 +26,10 @@ _METHODS: tuple[type[Estimator], ...] = (
     MaximumLikelihood,
     RecursiveLeastSquares,
     HybridLeastSquares,
+    InstrumentalVariables,
+    DirectInverse,
+    ClosedLoopOutputError,
+    ClosedLoopInputError,
 )
 ESTIMATORS: dict[str, type[Estimator]] = {method.key: method for method in _METHODS}
 

@@ -182,10 +182,21 @@ def collect(
 
 
 def evidence_from_rows(
-    layout: Layout, base: BaseParameters, rows: Iterable[Rows], *, name: str = "rows", most_blocks: int = MOST_BLOCKS
+    layout: Layout,
+    base: BaseParameters,
+    rows: Iterable[Rows],
+    *,
+    name: str = "rows",
+    most_blocks: int = MOST_BLOCKS,
+    first_rows: int = _FIRST_ROWS,
 ) -> Evidence:
-    """Return the evidence of a stream of rows, in at most `most_blocks` blocks of time."""
-    blocks = tuple(_grown_blocks(layout, rows) if most_blocks > 1 else _one_block(layout, rows))
+    """Return the evidence of a stream of rows, in at most `most_blocks` blocks of time.
+
+    Parameters
+    ----------
+    first_rows : of a block before the first merges; a stream of known length needs none
+    """
+    blocks = tuple(_grown_blocks(layout, rows, first_rows) if most_blocks > 1 else _one_block(layout, rows))
     return _evidence(layout, base, blocks, name=name, fingerprint="")
 
 
@@ -206,9 +217,9 @@ def _one_block(layout: Layout, rows: Iterable[Rows]) -> list[Block]:
     return [] if first is None else [reduce(Block.merged, pieces, first).reduced()]
 
 
-def _grown_blocks(layout: Layout, rows: Iterable[Rows]) -> list[Block]:
+def _grown_blocks(layout: Layout, rows: Iterable[Rows], first_rows: int = _FIRST_ROWS) -> list[Block]:
     """Cut the stream into blocks of equal length; when there are too many, merge neighbours and double the length."""
-    size = _FIRST_ROWS
+    size = first_rows
     done: list[Block] = []
     open_block: Block | None = None
     for piece in rows:

@@ -83,7 +83,7 @@ class HybridLeastSquares(ReweightedLeastSquares):
         One weight a row and joint is kept: other models' rows are at the same times.
         """
         rows = repeated_rows(problem)
-        found = self.reweighted(rows)
+        found = self.fixed_point(rows)
         times: list[FloatArray] = []
         weights: list[FloatArray] = []
         for pieces in rows.recordings():

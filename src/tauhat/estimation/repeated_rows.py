@@ -13,6 +13,7 @@ from tauhat.dynamics.model import Layout
 from tauhat.estimation.evidence import MOST_BLOCKS, Evidence, evidence_from_rows
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.rows import Rows, filtered_rows
+from tauhat.estimation.solution import MOST_GROUPS
 
 MOST_BYTES = 2**28  # of rows that are kept; a longer log is read again at every pass
 
@@ -50,13 +51,14 @@ class RepeatedRows:
         return np.asarray(rows.tau - np.array(predicted))
 
     def weighted(self, weigh: Callable[[Rows, int], FloatArray], *, most_blocks: int = MOST_BLOCKS) -> Evidence:
-        """Return the evidence of all rows, each times the root of its weight.
+        """Return the evidence of all rows, each times the root of its weight, in blocks for error bars.
 
         Parameters
         ----------
         weigh : from a piece and the number of its recording to weights (n_v, n) of its equations
         """
         base, counts = self.problem.base, np.diff(self.layout.bounds)
+        share = -(-self.problem.evidence.n_t // MOST_GROUPS)
         parts = [
             evidence_from_rows(
                 self.layout,
@@ -64,6 +66,7 @@ class RepeatedRows:
                 (_times(piece, np.sqrt(weigh(piece, index)), counts) for piece in pieces),
                 name=self.problem.recordings[index].name,
                 most_blocks=most_blocks,
+                first_rows=max(share, 1),
             )
             for index, pieces in enumerate(self.recordings())
         ]

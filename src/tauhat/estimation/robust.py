@@ -48,6 +48,15 @@ _LEAST_BEND = 0.1  # of the weight: rows that hold the fit less than that do not
 _MANY = 0.3  # share of a joint's rows with less than half their weight that is worth a word
 
 
+class FixedPoint(NamedTuple):
+    """Values (n_b,), scales of the joints' residuals (n_v,), passes, and how far the last one moved the torque."""
+
+    values: FloatArray
+    scales: FloatArray
+    passes: int
+    moved: float
+
+
 class Reweighted(NamedTuple):
     """What the passes ended with.
 
@@ -118,28 +127,33 @@ class ReweightedLeastSquares(Estimator, ABC):
         )
 
     def reweighted(self, rows: RepeatedRows) -> Reweighted:
-        """Return the fixed point of weights and solution.
+        """Return the fixed point of weights and solution, and the evidence weighted so."""
+        point = self.fixed_point(rows)
+        evidence = rows.weighted(lambda piece, _: self.row_weights(rows, piece, point.values, point.scales))
+        values = solve(evidence, point.scales**-self.power, ridge=self.ridge)
+        return Reweighted(values, point.scales, evidence, point.passes + 1, point.moved)
+
+    def fixed_point(self, rows: RepeatedRows) -> FixedPoint:
+        """Return values and scales that the weights by their own residuals leave where they are.
 
         A loss with several minima starts from Huber's, and keeps its scale: so it ends in the minimum nearest to the
         convex one.
         """
         start = self.solve(rows.problem.evidence).values
-        scales = joint_scales(rows, start)
+        first = FixedPoint(start, joint_scales(rows, start), 0, np.inf)
         if self.loss.convex:
-            return self._ended(rows, *self._passes(rows, self.loss, start, scales, hold=False))
-        values, scales, used, _ = self._passes(rows, Huber(), start, scales, hold=False)
-        values, scales, more, moved = self._passes(rows, self.loss, values, scales, hold=True)
-        return self._ended(rows, values, scales, used + more, moved)
+            return self._passes(rows, self.loss, first, hold=False)
+        convex = self._passes(rows, Huber(), first, hold=False)
+        return self._passes(rows, self.loss, convex, hold=True)
 
     def row_weights(self, rows: RepeatedRows, piece: Rows, values: FloatArray, scales: FloatArray) -> FloatArray:
         """Return the weight of every equation of a piece, (n_v, n), between 0 and 1."""
         return self.loss.weight(rows.residuals(piece, values) / scales[:, None])
 
-    def _passes(
-        self, rows: RepeatedRows, loss: Loss, values: FloatArray, scales: FloatArray, *, hold: bool
-    ) -> tuple[FloatArray, FloatArray, int, float]:
-        """Return values, scales, number of passes and how far the last one moved the torque."""
-        given, moved, done = rows.problem.evidence, np.inf, 0
+    def _passes(self, rows: RepeatedRows, loss: Loss, start: FixedPoint, *, hold: bool) -> FixedPoint:
+        """Return what passes with one loss end with; `hold` keeps the scales."""
+        given, values, scales = rows.problem.evidence, start.values, start.scales
+        moved, done = np.inf, 0
         while done < self.passes and moved > self.tolerance:
             evidence, seen = _reweighted(rows, loss, values, scales)
             found = solve(evidence, scales**-self.power, ridge=self.ridge)
@@ -147,14 +161,7 @@ class ReweightedLeastSquares(Estimator, ABC):
             values = found
             scales = scales if hold else _scales(seen, given)
             done += 1
-        return values, scales, done, moved
-
-    def _ended(
-        self, rows: RepeatedRows, values: FloatArray, scales: FloatArray, passes: int, moved: float
-    ) -> Reweighted:
-        evidence = rows.weighted(lambda piece, _: self.row_weights(rows, piece, values, scales))
-        found = solve(evidence, scales**-self.power, ridge=self.ridge)
-        return Reweighted(found, scales, evidence, passes + 1, moved)
+        return FixedPoint(values, scales, start.passes + done, moved)
 
     def _covariance(self, rows: RepeatedRows, found: Reweighted) -> FloatArray:
         weights, evidence = found.scales**-self.power, found.evidence

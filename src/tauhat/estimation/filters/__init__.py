@@ -12,9 +12,9 @@ from tauhat.estimation.filters.state_filter import (
     SquareRootExtendedKalman,
     SquareRootUnscentedKalman,
     StateKalman,
-    StateNoise,
     UnscentedKalman,
 )
+from tauhat.estimation.filters.state_plan import StateNoise
 from tauhat.estimation.filters.steps import Belief, Innovation, InnovationTest, KalmanFilter
 
 __all__ = [
