@@ -5,7 +5,8 @@
 Every seed is a new motion of 20 s at 500 Hz with torque noise of 5 % of each joint's RMS torque and position noise of
 5e-5 rad, on the two-link arm; once more, one seed, on a UR5e. Weighted least squares on the same filtered rows stands
 beside them. Filters begin with the first 30 % of the log (`first-stretch`); in the second table on the two-link arm they
-begin with the description's masses, no friction, and 50 % uncertainty (`nominal`).
+begin with the description's masses, no friction, and 50 % uncertainty (`nominal`); in the third, the band of the state
+filter and that of the parallel model's loop are varied (`bands`).
 
 torque: error of the torque that the estimate makes on an unseen motion, over the torque, median over seeds; bias: root
 mean square over the parameters of mean error over its standard error (1 is none); inside: share of the 95 % intervals
@@ -70,7 +71,11 @@ FROM_NOMINAL: dict[str, Estimator] = {
         *(SquareRootCentralDifferenceKalman(beginning=Nominal()), AdaptiveInputError(beginning=Nominal())),
     )
 }
-BEGINNINGS = {"first-stretch": METHODS, "nominal": FROM_NOMINAL}
+BANDS: dict[str, Estimator] = {
+    **{f"ekf-root, {band:g} Hz": SquareRootExtendedKalman(band=band) for band in (1.0, 2.0, 5.0, 10.0, 30.0)},
+    **{f"adaptive, {band:g} Hz": AdaptiveInputError(bandwidth=band) for band in (0.5, 1.0, 2.0, 5.0)},
+}
+BEGINNINGS = {"first-stretch": METHODS, "nominal": FROM_NOMINAL, "bands": BANDS}
 
 
 @cache
@@ -174,7 +179,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     seeds = 3 if options.quick else options.seeds
-    cases = [("two_link", "first-stretch", seeds), ("two_link", "nominal", seeds)]
+    cases = [("two_link", beginning, seeds) for beginning in BEGINNINGS]
     cases += [] if options.quick else [("ur5e", "first-stretch", 1)]
     tables = {
         f"{name}, {beginning}, {count} seeds": measured(name, beginning, seeds=count, workers=options.workers)

@@ -4,6 +4,18 @@ from __future__ import annotations
 
 from tauhat.errors import ModelError
 from tauhat.estimation.didim import DirectInverse
+from tauhat.estimation.filters import (
+    Adaline,
+    AdaptiveInputError,
+    CentralDifferenceKalman,
+    HopfieldTank,
+    ParameterKalman,
+    SquareRootCentralDifferenceKalman,
+    SquareRootExtendedKalman,
+    SquareRootUnscentedKalman,
+    StateKalman,
+    UnscentedKalman,
+)
 from tauhat.estimation.hybrid import HybridLeastSquares
 from tauhat.estimation.idim_iv import InstrumentalVariables
 from tauhat.estimation.least_squares import Estimator, OrdinaryLeastSquares, WeightedLeastSquares
@@ -12,6 +24,7 @@ from tauhat.estimation.output_error import ClosedLoopInputError, ClosedLoopOutpu
 from tauhat.estimation.prior import PriorLeastSquares, RidgeLeastSquares
 from tauhat.estimation.recursive import RecursiveLeastSquares
 from tauhat.estimation.robust import BisquareLeastSquares, CauchyLeastSquares, HuberLeastSquares
+from tauhat.estimation.sequential import SequentialLeastSquares
 from tauhat.estimation.total_least_squares import TotalLeastSquares
 
 _METHODS: tuple[type[Estimator], ...] = (
@@ -30,6 +43,17 @@ _METHODS: tuple[type[Estimator], ...] = (
     DirectInverse,
     ClosedLoopOutputError,
     ClosedLoopInputError,
+    ParameterKalman,
+    StateKalman,
+    SquareRootExtendedKalman,
+    UnscentedKalman,
+    SquareRootUnscentedKalman,
+    CentralDifferenceKalman,
+    SquareRootCentralDifferenceKalman,
+    Adaline,
+    HopfieldTank,
+    AdaptiveInputError,
+    SequentialLeastSquares,
 )
 ESTIMATORS: dict[str, type[Estimator]] = {method.key: method for method in _METHODS}
 

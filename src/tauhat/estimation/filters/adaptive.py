@@ -21,8 +21,8 @@ bilinear, so that `C(q, dq) v = c((dq + v)/2) - c((dq - v)/2)`.
 Where the parameters leave no mass matrix, they are put back to the nearest ones, in the metric of G^-1, that do: those
 with `u'M(q; x)u >= least` are a half-space that holds x*, and going to it brings x nearer to x*, so that V only falls.
 
-With torque noise s is never zero, and dv/dt holds a part `K s / M` of it: the mean of `Y's` then pulls inertias down, in
-proportion to K. The loop is therefore no faster than the motion needs.
+With torque noise s is never zero, and dv/dt holds a part `K s / M` of it: the mean of `Y's` then pulls inertias down,
+in proportion to K. The loop is therefore no faster than the motion needs.
 
 G is the inverse of the mean of `W'K^-1 W` over the filtered rows W of the recordings, over the time T: all directions
 then learn alike, at 1/T, while the model follows the robot closely.
