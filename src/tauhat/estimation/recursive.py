@@ -95,6 +95,8 @@ class RecursiveLeastSquares(Estimator):
 
     def fit_problem(self, problem: Problem) -> Solution:
         """Return the solution at the end of the last recording."""
+        if self.half_life is None:
+            return self._weighted.fit(problem.evidence)
         check_rows(problem.evidence)
         faded = self.faded(repeated_rows(problem))
         solved = self._weighted.solve(faded)
