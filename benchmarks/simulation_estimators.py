@@ -62,7 +62,7 @@ SMALL = 0.01  # of the joint's torque: a parameter is known to one unit when its
 FILTERS = {
     "suitable": (1e-4, Processing(cutoff=10.0, motion_cutoff=30.0)),
     "late: 100 Hz": (1e-4, Processing(cutoff=40.0, motion_cutoff=100.0)),
-    "early: 2 Hz": (0.0, Processing(cutoff=20.0, motion_cutoff=2.0)),
+    "early: 1 Hz": (0.0, Processing(cutoff=20.0, motion_cutoff=1.0)),
 }
 
 

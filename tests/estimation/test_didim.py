@@ -49,7 +49,7 @@ def test_it_says_why_it_ended():
     assert solution.cause.startswith(f"converged after {solution.passes} passes: the last pass moved the torque by")
     assert solution.advice == ""
     short = DirectInverse(loop=driven().loop, most_passes=1, tolerance=1e-9).fit_problem(problem(log))
-    assert short.cause.startswith("stopped after 1 passes")
+    assert short.cause.startswith("stopped after 1 pass:")
     assert "law, gains and reference" in short.advice
 
 

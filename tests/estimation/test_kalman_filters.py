@@ -10,6 +10,7 @@ from filter_problems import (
     POSITION_NOISE,
     TORQUE_NOISE,
     exact_problem,
+    names,
     noisy,
     noisy_problem,
     problem_of,
@@ -279,3 +280,23 @@ def test_solve_alone_is_weighted_least_squares_for_what_settles_before():
     evidence = noisy_problem(0).evidence
     near = OrdinaryLeastSquares().solve(evidence).values
     assert np.allclose(StateKalman().solve(evidence).values, near, atol=0.05)
+
+
+def test_a_wide_band_lets_torque_noise_raise_the_inertias():
+    recording = truth().recording(seconds=8.0, rate=500.0)
+    inertial = [names().index(name) for name in ("Izz_1", "Ia_2")]
+    excess = {2.0: [], 40.0: []}
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        loud = replace(recording, tau=recording.tau + 0.6 * rng.normal(size=recording.q.shape))
+        precise = replace(loud, q=recording.q + 1e-6 * rng.normal(size=recording.q.shape))
+        for band, found in excess.items():
+            method = SquareRootExtendedKalman(band=band, beginning=near_truth())
+            found.append((method.fit_problem(problem_of(precise)).values - true_values())[inertial])
+    wide, narrow = np.mean(excess[40.0], axis=0), np.mean(excess[2.0], axis=0)
+    assert wide[0] > 0.05 * true_values()[inertial[0]]
+    assert np.abs(narrow[0]) < 0.3 * wide[0]
+
+
+def near_truth() -> Given:
+    return Given(values=tuple(true_values()), deviations=tuple(0.1 * np.abs(true_values()) + 0.02))

@@ -34,6 +34,8 @@ def test_without_forgetting_it_is_weighted_least_squares():
     np.testing.assert_allclose(solution.values, expected.values, rtol=1e-9)
     np.testing.assert_allclose(solution.covariance, expected.covariance, rtol=1e-6)
     np.testing.assert_allclose(NEVER.track(problem, every=3.0).values[-1], expected.values, rtol=1e-9)
+    faded = NEVER.faded(repeated_rows(problem))
+    np.testing.assert_allclose(WeightedLeastSquares().solve(faded).values, expected.values, rtol=1e-9)
 
 
 @pytest.mark.parametrize("every", [0.3, 2.0, 50.0])

@@ -28,9 +28,9 @@ def one_way(joint: int, speed: float) -> FloatArray:
     return whole
 
 
-def runs(*, ripple: float = 0.0, joints: tuple[int, ...] = (0, 1)) -> Recording:
+def runs(*, ripple: float = 0.0, joints: tuple[int, ...] = (0, 1), speeds: tuple[float, ...] = SPEEDS) -> Recording:
     """Return runs both ways at four speeds; `ripple` adds friction that depends on the position."""
-    ddq = np.concatenate([one_way(joint, way * v) for joint in joints for v in SPEEDS for way in (1, -1)])
+    ddq = np.concatenate([one_way(joint, way * v) for joint in joints for v in speeds for way in (1, -1)])
     dq = np.cumsum(ddq, axis=0) / RATE
     q = np.cumsum(dq, axis=0) / RATE
     torque = truth().torque(q, dq, ddq) + ripple * np.sin(3.0 * q) * np.tanh(dq / 0.05)
@@ -128,3 +128,18 @@ def test_a_joint_without_segments_is_named():
 def test_bad_rules_are_refused():
     with pytest.raises(ModelError, match="rules of segments"):
         SegmentRules(bins=0)
+
+
+def test_viscous_friction_is_left_to_the_second_step_where_there_are_reversals_alone():
+    for seed in range(3):
+        swing = truth().recording(seed=0, seconds=15.0, rate=RATE)
+        fit = identify_sequentially(problem_of(noisy(swing, seed)))
+        assert fit.pairs == 0
+        assert [names()[k] for k in fit.friction] == ["Fc_1", "Fc_2"]
+        error = np.abs(fit.solution.values - true_values())
+        assert (error < 4.5 * np.sqrt(np.diag(fit.solution.covariance))).all()
+
+
+def test_runs_at_one_speed_cannot_tell_viscous_from_dry_friction():
+    with pytest.raises(ModelError, match="several constant speeds"):
+        identify_sequentially(problem_of(noisy(runs(speeds=(0.6,)), 0)), rules=SegmentRules(window=1e-3))

@@ -232,10 +232,14 @@ def _between(signal, k, j, part):  # type: ignore[no-untyped-def]
 
     A straight line lies beside a curve by `step^2 / 8` of its bend, and a stiff law turns that into torque.
     """
-    if part == 0.0:
-        return signal[k, j]
     last = signal.shape[0] - 1
-    a, b, c, d = signal[max(k - 1, 0), j], signal[k, j], signal[min(k + 1, last), j], signal[min(k + 2, last), j]
+    if part == 0.0 or k == last:
+        return signal[k, j]
+    b, c = signal[k, j], signal[k + 1, j]
+    a = signal[k - 1, j] if k > 0 else 2.0 * b - c
+    d = signal[k + 2, j] if k + 2 <= last else 3.0 * (c - b) + a
+    if k == 0 and last > 1:
+        a = 3.0 * (b - c) + d
     cubic = 3.0 * (b - c) + d - a
     return b + 0.5 * part * (c - a + part * (2.0 * a - 5.0 * b + 4.0 * c - d + part * cubic))
 

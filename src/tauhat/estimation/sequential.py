@@ -1,9 +1,9 @@
 """Sequential identification: friction first, from segments in which it shows by itself; then inertia on the rest.
 
 1. Runs at constant speed in both directions and reversals are found in the recordings (`segments`).
-2. Friction parameters x_F are fitted to them alone, those that they tell (a standard error below half the value;
-   reversals alone say nothing of viscous friction): to half the differences of paired runs, `(W+ - W-) x_F / 2`, and to
-   what is left of torque and columns about a reversal after a parabola in time is taken out of both.
+2. Friction parameters x_F are fitted to them alone: to half the differences of paired runs, `(W+ - W-) x_F / 2`, and to
+   what is left of torque and columns about a reversal after a cubic in time is taken out of both. Columns of which
+   that leaves little, as of viscous friction, are too like gravity and inertia to be told there.
 3. All other parameters are fitted to all rows with friction held, `W_R x_R = tau - W_F x_F`; the error of x_F goes on
    into x_R by `-(W_R'W_R)^-1 W_R'W_F`.
 
@@ -39,7 +39,8 @@ from tauhat.estimation.segments import (
 )
 from tauhat.estimation.solution import Solution, joint_residuals, joint_torques, rank_and_condition
 
-LOOSE = 0.5  # standard error over value above which a friction parameter is left to the second step
+_APART = 1e3  # scaled condition number of the segments above which friction parameters are not told apart
+_SMOOTH = 0.2  # part of a column that must be left about a reversal when its cubic is taken out
 _SILENT = 1e-9  # a column below this part of the largest is not told by the segments
 
 
@@ -115,7 +116,8 @@ def identify_sequentially(
     pairs = list(contrasts(runs, rules=rules))
     turns = [turn for track in found for turn in reversals(track, tops, rules=rules)]
     _require_segments(problem, pairs, turns)
-    own, first = _first_step(*_friction_evidence(problem, pairs, turns), method)
+    evidence, own = _friction_evidence(problem, pairs, turns)
+    first = _first_step(evidence, method)
     return SequentialFit(
         maps=tuple(_map(joint, pairs, turns, problem.processing.cutoff) for joint in range(tops.size)),
         friction=own,
@@ -167,25 +169,31 @@ def _friction_evidence(
     n_v = problem.model.robot.n_v
     rows = [(pair[0].joint, _pair_rows(pair)) for pair in pairs] + [(turn.joint, _turn_rows(turn)) for turn in turns]
     norms = np.linalg.norm([np.linalg.norm(part[:, friction], axis=0) for _, part in rows], axis=0)
-    own = friction[norms > _SILENT * norms.max()]
+    own = friction[(norms > _SILENT * norms.max()) & (norms > 0.0)]
+    if not own.size:
+        raise ModelError("the segments tell no friction parameter", remedy="record runs at several constant speeds")
     supports = tuple(np.flatnonzero(np.isin(own, support)) for support in problem.evidence.supports)
     blocks = tuple(_block(joint, part[:, [*own, -1]], supports, n_v) for joint, part in rows)
     return Evidence(supports=supports, n_b=int(own.size), blocks=blocks, recordings=("segments",)), own
 
 
-def _first_step(evidence: Evidence, own: IntArray, method: Estimator) -> tuple[IntArray, Solution]:
-    """Return the friction parameters that the segments tell and their fit; the least certain goes until all are."""
-    kept = np.arange(own.size)
-    while kept.size:
-        solution = method.fit(evidence.keeping(kept))
-        relative = np.sqrt(np.diag(solution.covariance)) / np.maximum(np.abs(solution.values), np.finfo(float).tiny)
-        if relative.max() <= LOOSE:
-            return own[kept], solution
-        kept = np.delete(kept, int(relative.argmax()))
-    raise ModelError(
-        "the segments tell no friction parameter to half its value",
-        remedy="record runs at constant speed, several speeds, both ways",
-    )
+def _first_step(evidence: Evidence, method: Estimator) -> Solution:
+    """Return the fit of friction to the segments.
+
+    Raises
+    ------
+    ModelError
+        when they cannot tell its parameters apart, as runs at one speed cannot tell viscous from dry friction.
+    """
+    solution = method.fit(evidence)
+    if solution.rank < evidence.n_b or solution.condition > _APART:
+        raise ModelError(
+            "the segments cannot tell the friction parameters apart",
+            expected=f"condition below {_APART:g}",
+            got=f"rank {solution.rank} of {evidence.n_b}, condition {solution.condition:.3g}",
+            remedy="record runs at several constant speeds, both ways",
+        )
+    return solution
 
 
 def _block(joint: int, rows: FloatArray, supports: tuple[IntArray, ...], n_v: int) -> Block:
@@ -202,11 +210,17 @@ def _pair_rows(pair: Iterable[Contrast]) -> FloatArray:
 
 
 def _turn_rows(turn: Reversal) -> FloatArray:
-    """Return columns and torque about a reversal, without the parabola in time that fits best, (n, n_b + 1)."""
+    """Return columns and torque about a reversal, without the cubic in time that fits best, (n, n_b + 1).
+
+    Columns that are nearly cubics are zero.
+    """
     track, rows = turn.track, turn.rows
     table = np.column_stack([track.columns[rows, turn.joint], track.tau[rows, turn.joint]])
-    basis, _ = np.linalg.qr(np.vander(track.t[rows] - turn.t, 3))
-    return np.asarray(table - basis @ (basis.T @ table))
+    basis, _ = np.linalg.qr(np.vander(track.t[rows] - turn.t, 4))
+    left = table - basis @ (basis.T @ table)
+    about = np.linalg.norm(table - table.mean(axis=0), axis=0)
+    left[:, :-1] *= np.linalg.norm(left[:, :-1], axis=0) > _SMOOTH * about[:-1]
+    return np.asarray(left)
 
 
 def _map(joint: int, pairs: list[tuple[Contrast, ...]], turns: list[Reversal], cutoff: float) -> FrictionMap:

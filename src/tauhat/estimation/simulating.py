@@ -154,10 +154,14 @@ class SimulationEstimator(Estimator):
     def _reason(self, passes: int, moved: float) -> tuple[str, str]:
         words = f"the last pass moved the torque by {100 * moved:.2g} % of the residual"
         if moved < self.tolerance:
-            return f"converged after {passes} passes: {words}", ""
+            return f"converged after {_counted(passes)}: {words}", ""
         if passes == self.most_passes:
-            return f"stopped after {passes} passes: {words}", _UNKNOWN_LOOP
+            return f"stopped after {_counted(passes)}: {words}", _UNKNOWN_LOOP
         return "", ""
+
+
+def _counted(passes: int) -> str:
+    return "1 pass" if passes == 1 else f"{passes} passes"
 
 
 def tried_in(runs: SimulatedRuns, values: FloatArray) -> Tried:
