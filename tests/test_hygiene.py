@@ -33,6 +33,7 @@ LEVELS = {
     for level, names in enumerate(
         [
             ("", "errors", "blas"),
+            ("workers",),
             ("arrays",),
             ("files",),
             ("robots",),
