@@ -34,6 +34,7 @@ LEVELS = {
         [
             ("", "errors", "blas"),
             ("workers",),
+            ("cluster",),
             ("arrays",),
             ("files",),
             ("robots",),
@@ -59,8 +60,9 @@ HOMES = {
     "viser": {"report"},
     "jinja2": {"report"},
     "typer": {"cli"},
+    "distributed": {"cluster"},
 }
-HEAVY = ("numba", "pinocchio", "mujoco", "plotly", "polars", "scipy", "jinja2", "viser", "rich.table", "pandas")
+HEAVY = ("numba", "pinocchio", "mujoco", "plotly", "polars", "scipy", "jinja2", "viser", "rich.table", "pandas", "distributed")
 
 
 def imports(parts: tuple[str, ...]) -> Iterator[str]:

@@ -80,6 +80,10 @@ class MissingExtraError(TauhatError):
         self.library = library
         self.extra = extra
 
+    def __reduce__(self) -> tuple[type[MissingExtraError], tuple[str, str]]:
+        """Return how to make it again: a worker's error travels as a pickle."""
+        return type(self), (self.library, self.extra)
+
 
 class TauhatWarning(UserWarning):
     """Legal but doubtful; the message names its number."""

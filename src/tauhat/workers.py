@@ -58,7 +58,7 @@ class LocalWorkers(Workers):
         self, merge: Callable[[Result, Result], Result], function: Callable[[Item], Result], items: Sequence[Item]
     ) -> Result:
         """Return the merged results; what the processes send back is merged here."""
-        return merged_as_tree(merge, list(self.map(function, items)))
+        return merged_as_tree(merge, self.map(function, items))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,18 +71,27 @@ class _Alone(Generic[Item, Result]):
         return single_threaded(self.function)(item)
 
 
-def merged_as_tree(merge: Callable[[Result, Result], Result], results: Sequence[Result]) -> Result:
+def merged_as_tree(merge: Callable[[Result, Result], Result], results: Iterable[Result]) -> Result:
     """Return the results merged in pairs of neighbours, then the pairs, until one is left.
+
+    Two halves are merged as soon as both are there: of n results at most log2(n) + 1 wait. Which results are merged
+    with which depends on their number alone, never on when they come.
 
     Raises
     ------
     ArrayError
         when there is none.
     """
-    if not results:
+    waiting: list[tuple[int, Result]] = []
+    for result in results:
+        size, merged = 1, result
+        while waiting and waiting[-1][0] == size:
+            merged = merge(waiting.pop()[1], merged)
+            size *= 2
+        waiting.append((size, merged))
+    if not waiting:
         raise ArrayError("nothing to merge")
-    level = list(results)
-    while len(level) > 1:
-        pairs = [merge(*level[k : k + 2]) for k in range(0, len(level) - 1, 2)]
-        level = pairs + level[len(level) - len(level) % 2 :]
-    return level[0]
+    whole = waiting.pop()[1]
+    while waiting:
+        whole = merge(waiting.pop()[1], whole)
+    return whole

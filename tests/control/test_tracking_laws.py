@@ -55,6 +55,7 @@ def test_the_integral_stops_at_the_limit_and_returns_from_it():
         (PID, {"kp": [1.0, 1.0], "kd": [1.0, 1.0], "ki": [1.0]}, "PID: ki has the wrong shape"),
         (PD, {"kp": [-1.0], "kd": [1.0]}, "PD: a gain is negative"),
         (PDFeedforward, {"kp": [1.0], "kd": [1.0], "torque_limit": 0.0}, "PDFeedforward, joint 1: a torque limit"),
+        (PD, {"kp": [], "kd": []}, "PD: kp is empty; expected a gain a joint"),
     ],
 )
 def test_impossible_gains_are_refused(law, settings, message):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -81,6 +81,24 @@ def test_first_values_that_move_no_robot_are_replaced_by_the_nominal_ones():
         tried_in(runs, WeightedLeastSquares().solve(noisy.evidence).values)
     solution = DirectInverse(loop=arm.loop).fit_problem(noisy)
     assert np.abs(solution.values - arm.values).max() < 0.02 * np.abs(arm.values).max()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Misled(DirectInverse):
+    """Passes that lead to no robot from wherever the first values are those of least squares."""
+
+    def improved(self, runs, tried):
+        found = super(Misled, self).improved(runs, tried)
+        misled = np.array_equal(tried.values, self.inner.solve(runs.problem.evidence).values)
+        return found._replace(values=-1e3 * found.values) if misled else found
+
+
+def test_passes_that_lead_to_no_robot_begin_again_at_the_nominal_one():
+    arm = driven()
+    log = arm.recording(np.random.default_rng(0), position=1e-4)
+    solution = Misled(loop=arm.loop).fit_problem(problem(log))
+    assert solution.cause.startswith("converged after")
+    assert np.abs(solution.values - arm.values).max() < 0.01 * np.abs(arm.values).max()
 
 
 def test_a_physically_consistent_form_is_one_more_constraint_on_the_last_pass():

@@ -95,6 +95,41 @@ def test_intervals_at_the_end_cover_a_truth_that_stays():
     assert 0.88 <= np.mean(hits) <= 0.997
 
 
+@pytest.mark.parametrize("half_life", [1e6, 60.0, 4.0, 1.0])
+def test_a_memory_of_a_few_groups_of_time_is_no_surer_than_these(half_life):
+    problem = clean(0)
+    span = problem.evidence.n_t / 40.0 * np.log(2.0) / half_life
+    # Rows of weights exp(-a t) over a time T are worth 2 tanh(aT / 2) / aT of themselves.
+    expected = 16.0 * 2.0 * np.tanh(0.5 * span) / span - 1.0
+    assert RecursiveLeastSquares(half_life=half_life).fit_problem(problem).degrees == pytest.approx(
+        max(1.0, expected), abs=0.6
+    )
+
+
+@pytest.mark.parametrize("half_life", [4.0, 1.0, 0.3])
+def test_error_bars_are_at_least_those_of_white_noise_on_rows_of_these_weights(half_life):
+    problem = clean(3)
+    rows = repeated_rows(problem)
+    piece = rows.kept[0]
+    left = np.tile(0.5 ** ((piece.t[-1] - piece.t) / half_life), 2)
+    whole = np.zeros((2 * piece.t.size, BASE.n_b + 1))
+    for joint, place in enumerate(rows.places):
+        part = slice(joint * piece.t.size, (joint + 1) * piece.t.size)
+        whole[part, place] = piece.columns[rows.layout.of_joint(joint)].T
+        whole[part, -1] = piece.tau[joint]
+    solution = RecursiveLeastSquares(half_life=half_life, power=0.0).fit_problem(problem)
+    errors = whole[:, -1] - whole[:, :-1] @ solution.values
+    noise = left @ errors**2 / left.sum()
+    inverse = np.linalg.inv(whole[:, :-1].T @ (left[:, None] * whole[:, :-1]))
+    white = noise * np.sum(left**2) / left.sum() * np.diag(inverse)
+    assert (np.diag(solution.covariance) > white).all()
+
+
+def test_a_short_memory_covers_the_truth():
+    hits = [covered(RecursiveLeastSquares(half_life=0.7).fit_problem(clean(seed))) for seed in range(16)]
+    assert np.mean(hits) > 0.95
+
+
 def test_what_is_left_of_the_beginning_is_told():
     assert FADING.fit_problem(clean(0)).cause == "solved at the end; of the first row 3.1 % is left"
 

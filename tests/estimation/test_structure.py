@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -108,11 +109,9 @@ def test_whole_recordings_are_left_out_and_of_one_its_stretches() -> None:
 
 
 def test_one_recording_must_gain_more_than_several() -> None:
-    for count, least in ((1, 0.1), (3, 0.03)):
-        for extra in MORE:
-            for seed in range(6):
-                for trial in chosen(extra, seed, "plain", count).structure.trials:
-                    assert not trial.taken or trial.gain > max(least, 3.0 * trial.uncertainty)
+    for (count, least), extra, seed in product(((1, 0.1), (3, 0.03)), MORE, range(6)):
+        for trial in chosen(extra, seed, "plain", count).structure.trials:
+            assert not trial.taken or trial.gain > max(least, 3.0 * trial.uncertainty)
 
 
 def test_a_term_of_the_model_that_only_harms_is_dropped() -> None:

@@ -349,7 +349,7 @@ def test_files_of_the_truth_are_read_in_both_versions(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("document", "said"),
     [
-        ({"schema_version": 3}, "unknown form of truth; expected tauhat.truth, version 1 or 2, got 3; update"),
+        ({"schema_version": 4}, "unknown form of truth; expected tauhat.truth, version 1 to 3, got 4; update"),
         ({"schema": "tauhat.truth", "schema_version": 2, "plant": {"laws": []}}, "not a readable truth.*damaged"),
         ({"parameters": [{"name": "m_1", "value": 1.0}]}, "not a readable truth"),
         ([], "not a readable truth"),

@@ -11,11 +11,13 @@ import numpy as np
 import pinocchio
 import pytest
 
+from tauhat.dynamics import inverse_dynamics
 from tauhat.errors import MissingExtraError, SimulationError
+from tauhat.robots import builtin_names, load_robot
 from tauhat.robots.joint import inertia_at_origin
 from tauhat.robots.kinematics import pinocchio_model
 from tauhat.robots.robot import Robot
-from tauhat.simulation import build_plant, nominal_parameters, perturbed, plant_gravity_torque
+from tauhat.simulation import build_plant, nominal_parameters, perturbed, plant_gravity_torque, plant_torque
 
 BRANCHED = (-1, 0, 0, 1, 2, -1, 5)  # breadth first: MuJoCo numbers it otherwise
 
@@ -108,3 +110,16 @@ def test_missing_mujoco_names_the_extra(make_robot: Callable[..., Robot], monkey
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"mujoco is not installed; pip install 'tauhat\[simulation\]'"):
         build_plant(make_robot())
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_mujoco_pinocchio_and_the_kernels_agree_on_every_builtin_robot(name: str) -> None:
+    robot = load_robot(name)
+    q, dq, ddq = np.random.default_rng(7).standard_normal((3, 20, robot.n_v))
+    model = pinocchio_model(robot)
+    data = model.createData()
+    expected = np.array([pinocchio.rnea(model, data, *state) for state in zip(q, dq, ddq, strict=True)])
+    tolerance = {"rtol": 0, "atol": 1e-8 * np.abs(expected).max()}
+    np.testing.assert_allclose(inverse_dynamics(robot, q, dq, ddq), expected, **tolerance)
+    rotor = nominal_parameters(robot).rotor
+    np.testing.assert_allclose(plant_torque(build_plant(robot), q, dq, ddq) - rotor * ddq, expected, **tolerance)

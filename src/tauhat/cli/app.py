@@ -25,6 +25,7 @@ from tauhat.cli.commands import (
     report,
     robots,
     simulate,
+    study,
     verify,
     view,
 )
@@ -50,6 +51,7 @@ app.command("verify")(as_command(verify.run, verify.Options))
 app.command("payload")(as_command(payload.run, payload.Options))
 app.command("calibrate-drives")(as_command(calibrate_drives.run, calibrate_drives.Options))
 app.command("compare")(as_command(compare.run, compare.Options))
+app.command("study")(as_command(study.run, study.Options))
 app.command("report")(as_command(report.run, report.Options))
 app.command("export")(as_command(export.run, export.Options))
 app.command("view")(as_command(view.run, view.Options))

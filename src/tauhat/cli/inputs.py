@@ -13,6 +13,8 @@ from tauhat.errors import TauhatWarning
 if TYPE_CHECKING:
     from tauhat.cli.options import Window
     from tauhat.estimation.estimate import Estimate
+    from tauhat.estimation.log_survey import LogFacts
+    from tauhat.recordings.log_source import LogSource
     from tauhat.recordings.processing import Processing
     from tauhat.recordings.recording import Recording
     from tauhat.robots.robot import Robot
@@ -25,6 +27,15 @@ def read_recordings(logs: Sequence[Path], *, map_file: Path | None, rows: Window
     return tuple(read_recording(log, map=map_file, rows=rows) for log in logs)
 
 
+def sources_of(
+    logs: Sequence[Path], *, map_file: Path | None, rows: Window | None, period: float | None
+) -> tuple[LogSource, ...]:
+    """Return how workers read the logs: all through the same map and window."""
+    from tauhat.recordings.log_source import LogSource
+
+    return tuple(LogSource(path=log, map=map_file, rows=rows, period=period) for log in logs)
+
+
 def averaged(recordings: Sequence[Recording], *, period: float | None) -> tuple[Recording, ...]:
     """Return the recordings, each averaged over its periods of `period` seconds where one is given."""
     from tauhat.recordings.periods import average_periods
@@ -34,7 +45,9 @@ def averaged(recordings: Sequence[Recording], *, period: float | None) -> tuple[
     return tuple(average_periods(recording, period=period).recording for recording in recordings)
 
 
-def robot_of_recordings(name: str, recordings: Sequence[Recording], *, locked: Mapping[str, float] | None) -> Robot:
+def robot_of_recordings(
+    name: str, recordings: Sequence[Recording] | Sequence[LogFacts], *, locked: Mapping[str, float] | None
+) -> Robot:
     """Return the robot, fitted to the joints that the recordings have."""
     from tauhat.robots.fitting import check_joint_order, fit_to_joints
     from tauhat.robots.library import load_robot

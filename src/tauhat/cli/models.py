@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tauhat.dynamics.model import TorqueModel
+    from tauhat.estimation.log_survey import LogFacts
     from tauhat.recordings.recording import Recording
     from tauhat.robots.robot import Robot
 
@@ -14,7 +15,7 @@ AUTO = "auto"
 _WHOLE = frozenset({"plain", "robust", AUTO})
 
 
-def model_of(robot: Robot, text: str, recordings: Sequence[Recording] = ()) -> TorqueModel:
+def model_of(robot: Robot, text: str, recordings: Sequence[Recording] | Sequence[LogFacts] = ()) -> TorqueModel:
     """Return the model of a list of terms, of the names plain, robust or auto, or of a TOML file.
 
     plain, robust and auto bring the coupling of motors that, after the log's map, turn with two joints.

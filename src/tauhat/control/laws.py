@@ -35,6 +35,8 @@ class TrackingLaw(ABC):
     def __post_init__(self) -> None:
         where = type(self).__name__
         kp = frozen("kp", self.kp, (None,), where=where)
+        if not kp.size:
+            raise ArrayError("kp is empty", where=where, expected="a gain a joint")
         kd = frozen("kd", self.kd, kp.shape, where=where)
         if min(kp.min(), kd.min()) < 0.0:
             raise ArrayError("a gain is negative", where=where, got=f"kp {kp.min():g}, kd {kd.min():g}")

@@ -14,8 +14,8 @@ Across joint i, with x = R'w_p, g = R'd_p, A = R abar, and a sum over the joints
                ubar_j += R ubar_j    zbar_j += R zbar_j + P x R ubar_j
 No derivative of R is needed.
 
-Layout as in `sweep_kernel`; slots 33-35 qbar, dqbar, ddqbar, 36-38 xbar, 39-41 A. Of every link are kept R and P in `pose`, x in
-`turn`, w d a in `state`, and the bars of w d a in `link_bar`; `axes` and `axes_bar` hold z u and their bars.
+Layout as in `sweep_kernel`; slots 33-35 qbar, dqbar, ddqbar, 36-38 xbar, 39-41 A. `kept[1536 * i]` are link i's R and P, from
+768 on its x, from 960 on the bars of w d a; `axes[768 * (n_v * i + j)]` z, u of joint j seen from link i, from 384 on their bars.
 """
 
 from __future__ import annotations
@@ -29,42 +29,34 @@ from tauhat.dynamics.sweep_kernel import sweep_link
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def adjoint_kernel(parents, prismatic, abc, place, axis, gravity, q, dq, ddq, ybar, q_out, dq_out, ddq_out):  # type: ignore[no-untyped-def]
-    """Add df/dq, df/ddq, df/dddq (n_v, n_t) to the outputs from `ybar` (10 n_v, n_v, n_t); entries never loaded are ignored."""
+def adjoint_kernel(links, q, dq, ddq, ybar, gradient):  # type: ignore[no-untyped-def]
+    """Add df/dq, df/ddq, df/dddq to the `gradient` (n_v, n_t) each, from `ybar` (10 n_v, n_v, n_t).
+
+    Entries of `ybar` that are never loaded are ignored.
+    """
+    q_out, dq_out, ddq_out = gradient
     n_v, n_t = q.shape
     x = np.zeros(64 * 56)
-    state, pose, turn = np.zeros(576 * n_v), np.zeros(768 * n_v), np.zeros(192 * n_v)
-    axes = np.zeros(384 * n_v * n_v)
-    link_bar, axes_bar = np.zeros(576 * n_v), np.zeros(384 * n_v * n_v)
+    state, kept, axes = np.zeros(576 * n_v), np.zeros(1536 * n_v), np.zeros(768 * n_v * n_v)
     block = np.zeros((5, n_v, 64))
     bars = np.zeros(640)
     for start in range(0, n_t, 64):
         size = min(64, n_t - start)
         load_block(start, size, q, dq, ddq, block)
-        link_bar[:] = 0.0
-        axes_bar[:] = 0.0
         for i in range(n_v):
-            p = parents[i]
-            sweep_link(i, p, prismatic[i], abc, place, axis, gravity, block, x, state)
-            _keep(x, pose[768 * i : 768 * i + 768], turn[192 * i : 192 * i + 192])
-            j = p
-            while j >= 0:
-                carry_axis(_of(axes, n_v, p, j), _of(axes, n_v, i, j), x)
-                j = parents[j]
-            own_axis(axis[i, 0], axis[i, 1], axis[i, 2], prismatic[i], _of(axes, n_v, i, i))
+            sweep_link(i, links, block, x, state)
+            _keep(x, kept[1536 * i : 1536 * i + 1536])
+            _see_axes(i, links, axes, x)
         for i in range(n_v - 1, -1, -1):
+            link, link_bar = state[576 * i : 576 * i + 576], kept[1536 * i + 960 : 1536 * i + 1536]
             j = i
             while j >= 0:
                 _load_bars(i, j, start, size, ybar, bars)
-                _pull_columns(
-                    bars,
-                    _of(axes, n_v, i, j),
-                    state[576 * i : 576 * i + 576],
-                    link_bar[576 * i : 576 * i + 576],
-                    _of(axes_bar, n_v, i, j),
-                )
-                j = parents[j]
-            _pull_joint(i, parents, prismatic[i], abc, axis, block, pose, turn, state, axes, link_bar, axes_bar, x)
+                _pull_columns(bars, _of(axes, n_v, i, j), link, link_bar, _bar_of(axes, n_v, i, j))
+                j = links[j].parent
+            _pull_rates(i, links, block, state, kept, x)
+            if links[i].parent >= 0:
+                _hand_inward(i, links, state, kept, axes, x)
             for s in range(size):
                 q_out[i, start + s] += x[64 * 33 + s]
                 dq_out[i, start + s] += x[64 * 34 + s]
@@ -73,16 +65,40 @@ def adjoint_kernel(parents, prismatic, abc, place, axis, gravity, q, dq, ddq, yb
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _of(axes, n_v, i, j):  # type: ignore[no-untyped-def]
-    base = 384 * (n_v * i + j)
+    base = 768 * (n_v * i + j)
+    return axes[base : base + 384]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _bar_of(axes, n_v, i, j):  # type: ignore[no-untyped-def]
+    base = 768 * (n_v * i + j) + 384
     return axes[base : base + 384]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _keep(x, pose, turn):  # type: ignore[no-untyped-def]
+def _keep(x, kept):  # type: ignore[no-untyped-def]
+    """Keep R, P and x of a link, and clear its bars."""
     for k in range(768):
-        pose[k] = x[k]
+        kept[k] = x[k]
     for k in range(192):
-        turn[k] = x[64 * 30 + k]
+        kept[768 + k] = x[64 * 30 + k]
+    for k in range(960, 1536):
+        kept[k] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _see_axes(i, links, axes, x):  # type: ignore[no-untyped-def]
+    """Fill z, u of every joint that carries link i, and clear their bars."""
+    n_v, p = links.size, links[i].parent
+    j = i
+    while j >= 0:
+        seen = _of(axes, n_v, i, j)
+        if j == i:
+            own_axis(links[i], seen)
+        else:
+            carry_axis(_of(axes, n_v, p, j), seen, x)
+        _bar_of(axes, n_v, i, j)[:] = 0.0
+        j = links[j].parent
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
@@ -129,38 +145,42 @@ def _pull_columns(bars, seen, link, link_bar, seen_bar):  # type: ignore[no-unty
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _pull_joint(i, parents, prismatic, abc, axis, block, pose, turn, state, axes, link_bar, axes_bar, x):  # type: ignore[no-untyped-def]
-    """Leave qbar, dqbar, ddqbar in slots 33-35 and hand the rest to the parent."""
-    n_v = parents.size
-    p = parents[i]
-    placed, turned = pose[768 * i : 768 * i + 768], turn[192 * i : 192 * i + 192]
-    here, bar = state[576 * i : 576 * i + 576], link_bar[576 * i : 576 * i + 576]
-    e0, e1, e2 = axis[i, 0], axis[i, 1], axis[i, 2]
-    speed, change = block[3, i], block[4, i]
-    if prismatic:
-        _slide_rates(e0, e1, e2, speed, turned, bar, x)
+def _pull_rates(i, links, block, state, kept, x):  # type: ignore[no-untyped-def]
+    """Leave qbar so far, dqbar, ddqbar and xbar in slots 33-38."""
+    link = links[i]
+    turned, bar = kept[1536 * i + 768 : 1536 * i + 960], kept[1536 * i + 960 : 1536 * i + 1536]
+    if link.prismatic:
+        _slide_rates(link.axis, block[3, i], turned, bar, x)
     else:
-        _turn_rates(e0, e1, e2, speed, change, turned, here, bar, x)
-    if p < 0:
-        return
-    onto, before = link_bar[576 * p : 576 * p + 576], state[576 * p : 576 * p + 576]
-    _hand_link(placed, bar, before, onto, x)
-    if prismatic:
-        _slide_position(abc[i, 0], axis[i], before, x)
-    j = p
-    while j >= 0:
-        seen_bar, inner_bar = _of(axes_bar, n_v, i, j), _of(axes_bar, n_v, p, j)
-        if prismatic:
-            _slide_axis(abc[i, 0], axis[i], placed, seen_bar, _of(axes, n_v, p, j), x)
-        else:
-            _turn_axis(e0, e1, e2, seen_bar, _of(axes, n_v, i, j), x)
-        _hand_axis(placed, seen_bar, inner_bar)
-        j = parents[j]
+        _turn_rates(link.axis, (block[3, i], block[4, i]), turned, state[576 * i : 576 * i + 576], bar, x)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _turn_rates(e0, e1, e2, speed, change, turned, here, bar, x):  # type: ignore[no-untyped-def]
-    """Slots: 33 qbar so far, 34 dqbar, 35 ddqbar, 36-38 xbar."""
+def _hand_inward(i, links, state, kept, axes, x):  # type: ignore[no-untyped-def]
+    """Complete qbar in slot 33 and hand the rest to the parent."""
+    n_v, link = links.size, links[i]
+    p = link.parent
+    placed, bar = kept[1536 * i : 1536 * i + 768], kept[1536 * i + 960 : 1536 * i + 1536]
+    onto, before = kept[1536 * p + 960 : 1536 * p + 1536], state[576 * p : 576 * p + 576]
+    _hand_link(placed, bar, before, onto, x)
+    if link.prismatic:
+        _slide_position(link.abc[0], link.axis, before, x)
+    j = p
+    while j >= 0:
+        seen_bar = _bar_of(axes, n_v, i, j)
+        if link.prismatic:
+            _slide_axis(link.abc[0], link.axis, placed, seen_bar, _of(axes, n_v, p, j), x)
+        else:
+            _turn_axis(link.axis, seen_bar, _of(axes, n_v, i, j), x)
+        _hand_axis(placed, seen_bar, _bar_of(axes, n_v, p, j))
+        j = links[j].parent
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _turn_rates(e, rates, turned, here, bar, x):  # type: ignore[no-untyped-def]
+    """Slots: 33 qbar so far, 34 dqbar, 35 ddqbar, 36-38 xbar; `rates` are dq, ddq (64,)."""
+    e0, e1, e2 = e[0], e[1], e[2]
+    speed, change = rates
     for s in range(64):
         dq, ddq = speed[s], change[s]
         v0, v1, v2 = turned[s], turned[64 + s], turned[64 * 2 + s]
@@ -186,7 +206,8 @@ def _turn_rates(e0, e1, e2, speed, change, turned, here, bar, x):  # type: ignor
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _slide_rates(e0, e1, e2, speed, turned, bar, x):  # type: ignore[no-untyped-def]
+def _slide_rates(e, speed, turned, bar, x):  # type: ignore[no-untyped-def]
+    e0, e1, e2 = e[0], e[1], e[2]
     for s in range(64):
         dq = speed[s]
         v0, v1, v2 = turned[s], turned[64 + s], turned[64 * 2 + s]
@@ -258,7 +279,8 @@ def _slide_axis(r, e, placed, seen_bar, inner, x):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _turn_axis(e0, e1, e2, seen_bar, seen, x):  # type: ignore[no-untyped-def]
+def _turn_axis(e, seen_bar, seen, x):  # type: ignore[no-untyped-def]
+    e0, e1, e2 = e[0], e[1], e[2]
     for s in range(64):
         Z0, Z1, Z2 = seen_bar[s], seen_bar[64 + s], seen_bar[64 * 2 + s]
         U0, U1, U2 = seen_bar[64 * 3 + s], seen_bar[64 * 4 + s], seen_bar[64 * 5 + s]

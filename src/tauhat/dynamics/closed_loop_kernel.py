@@ -12,10 +12,12 @@ Where a held torque changes, the step around that time takes the mean of both.
 
 `runge_kutta_kernel` is the classical method of fourth order, explicit: for smooth friction, and to check the other.
 
-Arguments in tuples: `body` geometry, inertia (n_v, 10), rotor (n_v,); `passive` kinds, joints, shapes, weights of the
-elements; `law` kp, kd, ki, limit (n_v,); `reference` q, dq, ff (n_t, n_v), on cubics between the samples;
-`start` q, dq (2, n_v); `times` the step between samples, the steps of the integrator in it, and for how many of
-these the controller holds a torque, as sampled controllers do (0: it acts all the time). Filled: `out` (4, n_v, n_t) with q, dq, ddq, tau at every sample. Returned: (code, sample, joint).
+Arguments in tuples:
+    arm    links of `KernelTree`, inertia (n_v, 10), rotor (n_v,), elements of `passive_kernel`
+    task   law: kp, kd, ki, limit (n_v,); reference: q, dq, ff (n_t, n_v), on cubics between the samples; times: the
+           step between samples, the steps of the integrator in it, and for how many of these the controller holds a
+           torque, as sampled controllers do (0: it acts all the time)
+`start` is q, dq (2, n_v). Filled: `out` (4, n_v, n_t) with q, dq, ddq, tau at every sample. Returned: (code, sample, joint).
 The integral stops while the torque is at its limit and the error would drive it further.
 
 Source: Hairer, Lubich, Wanner, "Geometric numerical integration", 2006 (leapfrog); Newmark 1959 (the h^2/4 term).
@@ -26,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved
+from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved, sweep_outward
 from tauhat.dynamics.passive_kernel import DAHL, LOAD_DAHL, bent_by, passive_kernel
 
 FINE, NO_BODY, RAN_AWAY = 0, 1, 2
@@ -34,49 +36,52 @@ RUNAWAY = 1e3  # [rad/s or m/s] no robot moves this fast
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def leapfrog_kernel(body, passive, law, reference, start, times, out):  # type: ignore[no-untyped-def]
+def leapfrog_kernel(arm, task, start, out):  # type: ignore[no-untyped-def]
     """Simulate by leapfrog steps; see the head of this file."""
-    n_t, n_v = reference[0].shape
-    rows = np.zeros((16, n_v))
+    elements, (law, _, times) = arm[3], task
+    _, n_v, n_t = out.shape
+    rows, bent = np.zeros((16, n_v)), np.zeros(elements.size)
     rows[0], rows[1] = start[0], start[1]
-    bent, work, masses = np.zeros(passive[0].size), np.empty(40 * n_v), np.empty((2, n_v, n_v))
-    code, joint = _leap(-1, 0, body, passive, law, reference, times, rows, bent, work, masses)
+    memory = (rows, bent, np.empty(40 * n_v), np.empty((2, n_v, n_v)))
+    code, joint = _leap(-1, 0, arm, task, memory)
     if code != FINE:
         return code, 0, joint
     _begin(start, rows)
     for k in range(n_t):
         for s in range(times[1]):
-            code, joint = _leap(k, s, body, passive, law, reference, times, rows, bent, work, masses)
+            code, joint = _leap(k, s, arm, task, memory)
             if code != FINE:
                 return code, k, joint
             if s == 0:
                 _record(rows, law, k, out)
-            failed = _move(passive, times, rows, bent)
+            failed = _move(elements, times, rows, bent)
             if failed >= 0:
                 return RAN_AWAY, k, failed
     return FINE, -1, -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _leap(turn, s, body, passive, law, reference, times, rows, bent, work, masses):  # type: ignore[no-untyped-def]
+def _leap(turn, s, arm, task, memory):  # type: ignore[no-untyped-def]
     """Find the change of speed of one step; return (code, joint).
 
-    `rows` are 16 quantities, (n_v,) each: q, u, v, a, d, tau, keep, load, free, integral, held torque, moved, bias,
-    taken, damping, stiffness.
+    `memory` are rows, bent, work, and two mass matrices. `rows` are 16 quantities, (n_v,) each: q, u, v, a, d, tau,
+    keep, load, free, integral, held torque, moved, bias, taken, damping, stiffness.
     """
+    law, _, times = task
+    rows, bent, _, masses = memory
     q, u, v, a, d, tau, keep, load = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6], rows[7]
     free, bias, taken, damping, stiffness = rows[8], rows[12], rows[13], rows[14], rows[15]
     h, mass = times[0] / times[1], masses[0]
     for j in range(q.size):
         v[j] = u[j] + 0.5 * h * a[j]
-    _mass_and_load(body, q, v, a, work, bias, mass, load)
+    _mass_and_load(arm, (q, v, a), memory[2], (bias, load), mass)
     if s == 0:  # once a sample: what is added to the diagonal would hide a body of negative mass
         masses[1] = mass
         failed = factorised(masses[1])
         if failed >= 0:
             return NO_BODY, failed
-    passive_kernel(*passive, q, v, load, bent, taken, damping, stiffness)
-    _steer(turn, s, law, reference, times, rows)
+    passive_kernel(arm[3], q, v, load, bent, rows[13:])
+    _steer(turn, s, task, rows)
     for j in range(q.size):
         keep[j] = free[j] * law[1][j] + damping[j]
         mass[j, j] += 0.5 * h * keep[j] + 0.25 * h * h * (free[j] * law[0][j] + stiffness[j])
@@ -91,12 +96,10 @@ def _leap(turn, s, body, passive, law, reference, times, rows, bent, work, masse
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _steer(turn, s, law, reference, times, rows):  # type: ignore[no-untyped-def]
+def _steer(turn, s, task, rows):  # type: ignore[no-untyped-def]
     """Fill the law's torque at the predicted state, and which joints may take kp and kd implicitly."""
     q, v, tau, free, integral, held = rows[0], rows[2], rows[5], rows[8], rows[9], rows[10]
-    kp, kd, ki, limit = law
-    q_ref, dq_ref, ff = reference
-    step, substeps, hold = times
+    (kp, kd, ki, limit), (q_ref, dq_ref, ff), (step, substeps, hold) = task
     k, h, part = max(turn, 0), step / substeps, s / substeps
     if hold > 0 and (k * substeps + s) % hold != 0:
         tau[:] = held
@@ -130,7 +133,7 @@ def _record(rows, law, k, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _move(passive, times, rows, bent):  # type: ignore[no-untyped-def]
+def _move(elements, times, rows, bent):  # type: ignore[no-untyped-def]
     """Pass a step; return the first joint that runs away, or -1."""
     q, u, d, moved = rows[0], rows[1], rows[4], rows[11]
     h = times[0] / times[1]
@@ -140,23 +143,24 @@ def _move(passive, times, rows, bent):  # type: ignore[no-untyped-def]
         q[j] += moved[j]
         if not abs(u[j]) < RUNAWAY:
             return j
-    _bend(passive, moved, bent)
+    _bend(elements, moved, bent)
     return -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def runge_kutta_kernel(body, passive, law, reference, start, times, out):  # type: ignore[no-untyped-def]
+def runge_kutta_kernel(arm, task, start, out):  # type: ignore[no-untyped-def]
     """Simulate by Runge-Kutta steps; see the head of this file."""
-    n_t, n_v = reference[0].shape
+    elements, times = arm[3], task[2]
+    _, n_v, n_t = out.shape
     h = times[0] / times[1]
-    state, rows = np.zeros((3, n_v)), np.zeros((9, n_v))  # state: q, dq, integral
+    state, rows = np.zeros((3, n_v)), np.zeros((10, n_v))  # state: q, dq, integral
     state[0], state[1] = start[0], start[1]
     rates = np.zeros((5, 3, n_v))  # of the four stages, behind a row of zeros
-    bent = np.zeros(passive[0].size)
-    work, mass = np.empty(40 * n_v), np.empty((n_v, n_v))
+    bent = np.zeros(elements.size)
+    memory = (state, bent, rates, rows, np.empty(40 * n_v), np.empty((n_v, n_v)))
     for k in range(n_t):
         for s in range(times[1]):
-            failed = _stages(k, s, body, passive, law, reference, times, state, rows, bent, work, mass, rates)
+            failed = _stages(k, s, arm, task, memory)
             if failed >= 0:
                 return NO_BODY, k, failed
             if s == 0:
@@ -164,49 +168,52 @@ def runge_kutta_kernel(body, passive, law, reference, start, times, out):  # typ
             rates[1] = (rates[1] + 2.0 * rates[2] + 2.0 * rates[3] + rates[4]) / 6.0
             state += h * rates[1]
             rows[5], rows[6] = rates[1, 1], h * rates[1, 0]
-            _bend(passive, rows[6], bent)
+            _bend(elements, rows[6], bent)
             if not np.abs(state[1]).max() < RUNAWAY:
                 return RAN_AWAY, k, int(np.argmax(np.abs(state[1])))
     return FINE, -1, -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _stages(  # type: ignore[no-untyped-def]
-    k, s, body, passive, law, reference, times, state, rows, bent, work, mass, rates
-):
+def _stages(k, s, arm, task, memory):  # type: ignore[no-untyped-def]
     """Fill the rates of the four stages; return the first joint without inertia, or -1."""
+    elements, times = arm[3], task[2]
+    state, bent, rates, rows, work, mass = memory
     h = times[0] / times[1]
     for place in range(4):
         ahead = 0.5 * ((place + 1) // 2)
         stage = state + ahead * h * rates[place]
         bending = bent.copy()
         rows[6] = stage[0] - state[0]
-        _bend(passive, rows[6], bending)
-        rate = rates[place + 1]
-        failed = _rate(k, s, ahead, body, passive, law, reference, times, stage, rows, bending, work, mass, rate)
+        _bend(elements, rows[6], bending)
+        failed = _rate((k, s, ahead), arm, task, (stage, bending), (rows, work, mass), rates[place + 1])
         if failed >= 0:
             return failed
     return -1
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _rate(  # type: ignore[no-untyped-def]
-    k, s, ahead, body, passive, law, reference, times, stage, rows, bending, work, mass, rate
-):
-    """Fill the rate of a stage; return the first joint without inertia, or -1."""
-    bias, taken, load, tau = rows[0], rows[1], rows[4], rows[3]
+def _rate(moment, arm, task, stage, scratch, rate):  # type: ignore[no-untyped-def]
+    """Fill the rate of a stage; return the first joint without inertia, or -1.
+
+    `moment` is sample, step of the integrator in it, and part of that step; `stage` the state and the bristles in it.
+    """
+    k, s, ahead = moment
+    times = task[2]
+    state, bending = stage
+    rows, work, mass = scratch
+    bias, taken, load, tau = rows[0], rows[1], rows[4], rows[9]
     substeps, hold = times[1], times[2]
-    _mass_and_load(body, stage[0], stage[1], rows[5], work, bias, mass, load)
-    # The damping and stiffness that the other integrator needs go where nothing is read.
-    passive_kernel(*passive, stage[0], stage[1], load, bending, taken, rows[2], rate[0])
+    _mass_and_load(arm, (state[0], state[1], rows[5]), work, (bias, load), mass)
+    passive_kernel(arm[3], state[0], state[1], load, bending, rows[1:4])  # damping and stiffness go unread
     rate[2] = rows[8]
     if hold == 0 or (ahead == 0.0 and (k * substeps + s) % hold == 0):
-        _law_torque(law, reference, k, (s + ahead) / substeps, stage, tau, rate)
+        _law_torque(task, k, (s + ahead) / substeps, state, tau, rate)
         rows[8] = rate[2]
     if s == 0 and ahead == 0.0:
         rows[7] = tau
     for j in range(tau.size):
-        rate[0, j] = stage[1, j]
+        rate[0, j] = state[1, j]
         rate[1, j] = tau[j] - bias[j] - taken[j]
     failed = factorised(mass)
     if failed < 0:
@@ -215,14 +222,13 @@ def _rate(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _law_torque(law, reference, k, part, stage, tau, rate):  # type: ignore[no-untyped-def]
+def _law_torque(task, k, part, state, tau, rate):  # type: ignore[no-untyped-def]
     """Fill `tau` and the rate of the integral, a `part` of the way from sample k to the next."""
-    kp, kd, ki, limit = law
-    q_ref, dq_ref, ff = reference
+    (kp, kd, ki, limit), (q_ref, dq_ref, ff), _ = task
     for j in range(tau.size):
-        e, de = _between(q_ref, k, j, part) - stage[0, j], _between(dq_ref, k, j, part) - stage[1, j]
+        e, de = _between(q_ref, k, j, part) - state[0, j], _between(dq_ref, k, j, part) - state[1, j]
         ahead = _between(ff, k, j, part)
-        tau[j], free = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * stage[2, j], limit[j])
+        tau[j], free = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * state[2, j], limit[j])
         rate[2, j] = e if free > 0.0 or tau[j] * e < 0.0 else 0.0
 
 
@@ -253,10 +259,16 @@ def _driven(wanted, limit):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _mass_and_load(body, q, v, a, work, bias, mass, load):  # type: ignore[no-untyped-def]
-    """Fill bias, mass matrix with rotors, and the rigid-body torque |M a + bias| that load friction sees."""
-    parents, prismatic, abc, place, axis, gravity, inertia, rotor = body
-    bias_and_mass(parents, prismatic, abc, place, axis, gravity, inertia, q, v, work, bias, mass)
+def _mass_and_load(arm, motion, work, torques, mass):  # type: ignore[no-untyped-def]
+    """Fill the mass matrix with rotors, and the `torques`: bias, and |M a + bias| that load friction sees.
+
+    `motion` is q, dq and the acceleration a to take, (n_v,) each.
+    """
+    links, inertia, rotor, _ = arm
+    q, v, a = motion
+    bias, load = torques
+    sweep_outward(links, inertia, q, v, work)
+    bias_and_mass(links, work, bias, mass)
     for i in range(q.size):
         torque = bias[i]
         for j in range(q.size):
@@ -267,8 +279,7 @@ def _mass_and_load(body, q, v, a, work, bias, mass, load):  # type: ignore[no-un
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _bend(passive, moved, bent):  # type: ignore[no-untyped-def]
-    kinds, joints, shapes, _ = passive
-    for k in range(kinds.size):
-        if kinds[k] == DAHL or kinds[k] == LOAD_DAHL:
-            bent[k] = bent_by(moved[joints[k]], shapes[k], bent[k])
+def _bend(elements, moved, bent):  # type: ignore[no-untyped-def]
+    for k in range(elements.size):
+        if elements[k].kind == DAHL or elements[k].kind == LOAD_DAHL:
+            bent[k] = bent_by(moved[elements[k].joint], elements[k].shape, bent[k])

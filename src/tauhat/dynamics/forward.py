@@ -63,13 +63,13 @@ def forward_dynamics(
     states = [frozen(name, value, (None, robot.n_v)) for name, value in (("q", q), ("dq", dq), ("tau", tau))]
     if len({state.shape[0] for state in states}) > 1:
         raise ArrayError("q, dq and tau differ in length", got=[state.shape[0] for state in states])
-    body = kernel_bodies(robot, masses)
+    body = _kernel_body(robot, masses)
     out = np.empty_like(states[0])
     edges = np.linspace(0, out.shape[0], threads + 1).astype(int)
 
     def part(begin: int, end: int) -> tuple[int, int]:
         rows = slice(begin, end)
-        sample, joint = forward_kernel(*body, states[0][rows], states[1][rows], states[2][rows], out[rows])
+        sample, joint = forward_kernel(body, tuple(state[rows] for state in states), out[rows])
         return begin + int(sample), int(joint)
 
     if threads == 1:
@@ -93,7 +93,7 @@ def rotor_mass_matrix(robot: Robot, q: FloatArray, *, masses: Masses | None = No
     """
     positions = frozen("q", q, (None, robot.n_v))
     out = np.empty((positions.shape[0], robot.n_v, robot.n_v))
-    mass_kernel(*kernel_bodies(robot, masses), positions, out)
+    mass_kernel(_kernel_body(robot, masses), positions, out)
     return out
 
 
@@ -106,11 +106,11 @@ def not_a_body(robot: Robot, joint: int, where: str) -> ModelError:
     )
 
 
-def kernel_bodies(robot: Robot, masses: Masses | None = None) -> tuple[NDArray[np.generic], ...]:
-    """Return the leading arguments of the forward kernels: geometry, inertia, rotors."""
+def _kernel_body(robot: Robot, masses: Masses | None = None) -> tuple[NDArray[np.generic], ...]:
+    """Return links, inertia and rotors, as the forward kernels take them."""
     inertia, rotor = nominal_masses(robot) if masses is None else masses
     return (
-        *kernel_tree(robot).geometry,
+        kernel_tree(robot).links,
         frozen("inertia", inertia, (robot.n_v, 10)),
         frozen("rotor", rotor, (robot.n_v,)),
     )

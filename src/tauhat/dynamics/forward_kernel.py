@@ -9,7 +9,7 @@ Rotor inertia and whatever an integrator treats implicitly are added to the diag
 positive definite; the index of the first joint whose pivot is not positive is returned, -1 when all are.
 
 All of it is linear in (m, h, I): links without mass of their own, as base parameters leave them, are no exception.
-`work` is scratch, 40 numbers a link, link i from `o = 40 i` on, its parent from p on: 0-8 R, 9-11 P, 12-14 w, 15-17 dw, 18-20 a, 21-23 f, 24-26 n, 27 m, 28-30 h, 31-36 I.
+`body` is the links of `KernelTree`, inertia (n_v, 10), rotor (n_v,). `work` is scratch, 40 numbers a link, link i from `o = 40 i` on, its parent from p on: 0-8 R, 9-11 P, 12-14 w, 15-17 dw, 18-20 a, 21-23 f, 24-26 n, 27 m, 28-30 h, 31-36 I.
 
 Source: Featherstone, "Rigid body dynamics algorithms", 2008, ch. 6 (composite rigid body algorithm).
 """
@@ -23,14 +23,15 @@ SMALLEST_PIVOT = 1e-12  # of the largest diagonal entry: less is no inertia
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def forward_kernel(  # type: ignore[no-untyped-def]
-    parents, prismatic, abc, place, axis, gravity, inertia, rotor, q, dq, tau, out
-):
-    """Fill `out` (n_t, n_v) with ddq from `q`, `dq`, `tau` (n_t, n_v); return (sample, joint) of a failure or -1, -1."""
+def forward_kernel(body, states, out):  # type: ignore[no-untyped-def]
+    """Fill `out` (n_t, n_v) with ddq of `states` q, dq, tau (n_t, n_v); return (sample, joint) of a failure or -1, -1."""
+    links, inertia, rotor = body
+    q, dq, tau = states
     n_t, n_v = q.shape
     work, bias, mass = np.empty(40 * n_v), np.empty(n_v), np.empty((n_v, n_v))
     for k in range(n_t):
-        bias_and_mass(parents, prismatic, abc, place, axis, gravity, inertia, q[k], dq[k], work, bias, mass)
+        sweep_outward(links, inertia, q[k], dq[k], work)
+        bias_and_mass(links, work, bias, mass)
         for i in range(n_v):
             mass[i, i] += rotor[i]
             out[k, i] = tau[k, i] - bias[i]
@@ -42,68 +43,72 @@ def forward_kernel(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def mass_kernel(  # type: ignore[no-untyped-def]
-    parents, prismatic, abc, place, axis, gravity, inertia, rotor, q, out
-):
-    """Fill `out` (n_t, n_v, n_v) with mass matrices, rotors included."""
+def mass_kernel(body, q, out):  # type: ignore[no-untyped-def]
+    """Fill `out` (n_t, n_v, n_v) with mass matrices at `q` (n_t, n_v), rotors included."""
+    links, inertia, rotor = body
     n_t, n_v = q.shape
     work, bias, rest = np.empty(40 * n_v), np.empty(n_v), np.zeros(n_v)
     for k in range(n_t):
-        bias_and_mass(parents, prismatic, abc, place, axis, gravity, inertia, q[k], rest, work, bias, out[k])
+        sweep_outward(links, inertia, q[k], rest, work)
+        bias_and_mass(links, work, bias, out[k])
         for i in range(n_v):
             out[k, i, i] += rotor[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def bias_and_mass(  # type: ignore[no-untyped-def]
-    parents, prismatic, abc, place, axis, gravity, inertia, q, dq, work, bias, mass
-):
-    """Fill `bias` (n_v,) and `mass` (n_v, n_v), without rotors, of the state `q`, `dq` (n_v,)."""
-    n_v = q.size
-    for i in range(n_v):
-        _placed(i, prismatic[i], abc, place, axis, q[i], work, 40 * i)
-        _outward(i, parents[i], prismatic[i], axis, gravity, dq[i], work)
+def sweep_outward(links, inertia, q, dq, work):  # type: ignore[no-untyped-def]
+    """Fill `work` with every link's place, motion for ddq = 0, and body (n_v, 10) at the state `q`, `dq` (n_v,)."""
+    for i in range(q.size):
+        _placed(links[i], q[i], work, 40 * i)
+        _outward(links[i], dq[i], work, 40 * i)
         _bodied(i, inertia, work, 40 * i)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def bias_and_mass(links, work, bias, mass):  # type: ignore[no-untyped-def]
+    """Fill `bias` (n_v,) and `mass` (n_v, n_v), without rotors, from `work` as `sweep_outward` leaves it."""
+    n_v = links.size
     for i in range(n_v - 1, -1, -1):
-        o = 40 * i
-        first = 21 if prismatic[i] else 24
-        bias[i] = axis[i, 0] * work[o + first] + axis[i, 1] * work[o + first + 1] + axis[i, 2] * work[o + first + 2]
-        if parents[i] >= 0:
-            _hand_inward(work, o, 40 * parents[i])
-            _merge_inward(work, o, 40 * parents[i])
+        o, link = 40 * i, links[i]
+        axis, first = link.axis, o + (21 if link.prismatic else 24)
+        bias[i] = axis[0] * work[first] + axis[1] * work[first + 1] + axis[2] * work[first + 2]
+        if link.parent >= 0:
+            _hand_inward(work, o, 40 * link.parent)
+            _merge_inward(work, o, 40 * link.parent)
     for i in range(n_v):
         for j in range(n_v):
             mass[i, j] = 0.0
     for i in range(n_v):
-        _column(i, parents, prismatic, axis, work, mass)
+        _column(i, links, work, mass)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _placed(i, slides, abc, place, axis, q, work, o):  # type: ignore[no-untyped-def]
-    p0, p1, p2 = place[i, 0], place[i, 1], place[i, 2]
-    if slides:
+def _placed(link, q, work, o):  # type: ignore[no-untyped-def]
+    abc, place, axis = link.abc, link.place, link.axis
+    p0, p1, p2 = place[0], place[1], place[2]
+    if link.prismatic:
         for k in range(9):
-            work[o + k] = abc[i, 0, k]
-        e0, e1, e2 = axis[i, 0] * q, axis[i, 1] * q, axis[i, 2] * q
+            work[o + k] = abc[0, k]
+        e0, e1, e2 = axis[0] * q, axis[1] * q, axis[2] * q
         p0 += work[o] * e0 + work[o + 1] * e1 + work[o + 2] * e2
         p1 += work[o + 3] * e0 + work[o + 4] * e1 + work[o + 5] * e2
         p2 += work[o + 6] * e0 + work[o + 7] * e1 + work[o + 8] * e2
     else:
         cosine, sine = np.cos(q), np.sin(q)
         for k in range(9):
-            work[o + k] = abc[i, 0, k] + abc[i, 1, k] * cosine + abc[i, 2, k] * sine
+            work[o + k] = abc[0, k] + abc[1, k] * cosine + abc[2, k] * sine
     work[o + 9], work[o + 10], work[o + 11] = p0, p1, p2
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _outward(i, parent, slides, axis, gravity, dq, work):  # type: ignore[no-untyped-def]
+def _outward(link, dq, work, o):  # type: ignore[no-untyped-def]
     """Velocity and acceleration of the link for ddq = 0; `sweep_kernel` gives the formulas."""
-    o = 40 * i
-    if parent < 0:
+    axis, gravity = link.axis, link.gravity
+    if link.parent < 0:
         w0 = w1 = w2 = d0 = d1 = d2 = 0.0
         a0, a1, a2 = -gravity[0], -gravity[1], -gravity[2]
     else:
-        p = 40 * parent
+        p = 40 * link.parent
         w0, w1, w2, d0, d1, d2 = work[p + 12], work[p + 13], work[p + 14], work[p + 15], work[p + 16], work[p + 17]
         p0, p1, p2 = work[o + 9], work[o + 10], work[o + 11]
         c0, c1, c2 = w1 * p2 - w2 * p1, w2 * p0 - w0 * p2, w0 * p1 - w1 * p0
@@ -113,7 +118,7 @@ def _outward(i, parent, slides, axis, gravity, dq, work):  # type: ignore[no-unt
     v0 = work[o] * w0 + work[o + 3] * w1 + work[o + 6] * w2
     v1 = work[o + 1] * w0 + work[o + 4] * w1 + work[o + 7] * w2
     v2 = work[o + 2] * w0 + work[o + 5] * w1 + work[o + 8] * w2
-    e0, e1, e2 = axis[i, 0] * dq, axis[i, 1] * dq, axis[i, 2] * dq
+    e0, e1, e2 = axis[0] * dq, axis[1] * dq, axis[2] * dq
     g0, g1, g2 = v1 * e2 - v2 * e1, v2 * e0 - v0 * e2, v0 * e1 - v1 * e0
     work[o + 15] = work[o] * d0 + work[o + 3] * d1 + work[o + 6] * d2
     work[o + 16] = work[o + 1] * d0 + work[o + 4] * d1 + work[o + 7] * d2
@@ -121,7 +126,7 @@ def _outward(i, parent, slides, axis, gravity, dq, work):  # type: ignore[no-unt
     work[o + 18] = work[o] * a0 + work[o + 3] * a1 + work[o + 6] * a2
     work[o + 19] = work[o + 1] * a0 + work[o + 4] * a1 + work[o + 7] * a2
     work[o + 20] = work[o + 2] * a0 + work[o + 5] * a1 + work[o + 8] * a2
-    if slides:
+    if link.prismatic:
         work[o + 12], work[o + 13], work[o + 14] = v0, v1, v2
         work[o + 18] += 2.0 * g0
         work[o + 19] += 2.0 * g1
@@ -223,12 +228,13 @@ def _merge_inward(work, o, p):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _column(i, parents, prismatic, axis, work, mass):  # type: ignore[no-untyped-def]
+def _column(i, links, work, mass):  # type: ignore[no-untyped-def]
     """Fill `mass[i, j]` and `mass[j, i]` for every joint j on the way from joint i to the base."""
     o = 40 * i
-    e0, e1, e2 = axis[i, 0], axis[i, 1], axis[i, 2]
+    axis = links[i].axis
+    e0, e1, e2 = axis[0], axis[1], axis[2]
     m, h0, h1, h2 = work[o + 27], work[o + 28], work[o + 29], work[o + 30]
-    if prismatic[i]:
+    if links[i].prismatic:
         f0, f1, f2 = m * e0, m * e1, m * e2
         n0, n1, n2 = h1 * e2 - h2 * e1, h2 * e0 - h0 * e2, h0 * e1 - h1 * e0
     else:
@@ -238,13 +244,14 @@ def _column(i, parents, prismatic, axis, work, mass):  # type: ignore[no-untyped
         n2 = work[o + 34] * e0 + work[o + 35] * e1 + work[o + 36] * e2
     j = i
     while True:
-        if prismatic[j]:
-            entry = axis[j, 0] * f0 + axis[j, 1] * f1 + axis[j, 2] * f2
+        link, axis = links[j], links[j].axis
+        if link.prismatic:
+            entry = axis[0] * f0 + axis[1] * f1 + axis[2] * f2
         else:
-            entry = axis[j, 0] * n0 + axis[j, 1] * n1 + axis[j, 2] * n2
+            entry = axis[0] * n0 + axis[1] * n1 + axis[2] * n2
         mass[i, j] = entry
         mass[j, i] = entry
-        if parents[j] < 0:
+        if link.parent < 0:
             return
         p = 40 * j
         F0 = work[p] * f0 + work[p + 1] * f1 + work[p + 2] * f2
@@ -254,7 +261,7 @@ def _column(i, parents, prismatic, axis, work, mass):  # type: ignore[no-untyped
         N1 = work[p + 3] * n0 + work[p + 4] * n1 + work[p + 5] * n2 + work[p + 11] * F0 - work[p + 9] * F2
         N2 = work[p + 6] * n0 + work[p + 7] * n1 + work[p + 8] * n2 + work[p + 9] * F1 - work[p + 10] * F0
         f0, f1, f2, n0, n1, n2 = F0, F1, F2, N0, N1, N2
-        j = parents[j]
+        j = link.parent
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})

@@ -43,8 +43,11 @@ _KNOWN: tuple[type[Term], ...] = (
     *(Dahl, LoadCoulomb, LoadDahl, Offset),
 )
 TERMS: Mapping[str, type[Term]] = {term.key: term for term in _KNOWN}
+"""Every term by its name."""
 PLAIN_TERMS = ("inertia", "rotor", "viscous", "coulomb", "offset")
+"""The terms of the textbook's model."""
 ROBUST_TERMS = ("inertia", "rotor", "viscous", "cube-root", "stribeck", "dahl", "load-dahl", "offset")
+"""The terms that predict real arms best, measured on several; what `identify` takes on the command line."""
 MODELS: Mapping[str, tuple[str, ...]] = {"plain": PLAIN_TERMS, "robust": ROBUST_TERMS}
 
 TermStates = tuple[FloatArray | None, ...]

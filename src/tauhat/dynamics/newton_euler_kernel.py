@@ -17,9 +17,7 @@ from tauhat.dynamics.sweep_kernel import sweep_link
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def newton_euler_kernel(  # type: ignore[no-untyped-def]
-    parents, prismatic, abc, place, axis, gravity, inertia, q, dq, ddq, out
-):
+def newton_euler_kernel(links, inertia, q, dq, ddq, out):  # type: ignore[no-untyped-def]
     """Fill `out` (n_v, n_t) with joint torques from `inertia` (n_v, 10) and `q`, `dq`, `ddq` (n_v, n_t)."""
     n_v, n_t = q.shape
     x = np.empty(64 * 56)
@@ -31,20 +29,21 @@ def newton_euler_kernel(  # type: ignore[no-untyped-def]
         size = min(64, n_t - start)
         load_block(start, size, q, dq, ddq, block)
         for i in range(n_v):
-            sweep_link(i, parents[i], prismatic[i], abc, place, axis, gravity, block, x, state)
+            sweep_link(i, links, block, x, state)
             kept = pose[768 * i : 768 * i + 768]
             for k in range(768):
                 kept[k] = x[k]
             _link_wrench(i, inertia, x, wrench)
         for i in range(n_v - 1, -1, -1):
-            base = 384 * i + (0 if prismatic[i] else 192)
+            link = links[i]
+            base = 384 * i + (0 if link.prismatic else 192)
             along = wrench[base : base + 192]
             torque = out[i, start : start + size]
-            e0, e1, e2 = axis[i, 0], axis[i, 1], axis[i, 2]
+            e0, e1, e2 = link.axis[0], link.axis[1], link.axis[2]
             for s in range(size):
                 torque[s] = e0 * along[s] + e1 * along[64 + s] + e2 * along[128 + s]
-            if parents[i] >= 0:
-                _hand_inward(i, parents[i], pose, wrench, x)
+            if link.parent >= 0:
+                _hand_inward(i, link.parent, pose, wrench, x)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})

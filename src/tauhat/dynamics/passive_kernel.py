@@ -20,6 +20,7 @@ from numba import njit
 
 OFFSET, SPRING, VISCOUS, SIGN, CUBE_ROOT, SIZE, FORWARDS, BACKWARDS, SIGN_FORWARDS, SIGN_BACKWARDS = range(10)
 STRIBECK, NARROW_SIGN, SQUARE, CUBE, DECAY, DAHL, LOAD_SIGN, LOAD_DAHL = range(10, 18)
+ELEMENT = np.dtype([("kind", np.int64), ("joint", np.int64), ("shape", np.float64), ("weight", np.float64)])
 SLOWEST = 1e-9  # [rad/s or m/s] taken for a joint at rest where a secant is asked for
 
 
@@ -67,16 +68,15 @@ def bent_by(moved, w, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def passive_kernel(  # type: ignore[no-untyped-def]
-    kinds, joints, shapes, weights, q, v, load, bent, torque, damping, stiffness
-):
-    """Fill `torque`, `damping`, `stiffness` (n_v,) of the state `q`, `v`, `load` (n_v,) and `bent` (n_elements,)."""
+def passive_kernel(elements, q, v, load, bent, out):  # type: ignore[no-untyped-def]
+    """Fill `out` (3, n_v), torque, damping, stiffness, of the state `q`, `v`, `load` (n_v,) and `bent` (n_elements,)."""
+    torque, damping, stiffness = out[0], out[1], out[2]
     for j in range(q.size):
         torque[j] = 0.0
         damping[j] = 0.0
         stiffness[j] = 0.0
-    for k in range(kinds.size):
-        j, kind, weight, w = joints[k], kinds[k], weights[k], shapes[k]
+    for k in range(elements.size):
+        j, kind, weight, w = elements[k].joint, elements[k].kind, elements[k].weight, elements[k].shape
         if kind >= 16:
             weight *= load[j]
         if kind == 15 or kind == 17:

@@ -22,7 +22,7 @@ from tauhat.dynamics.sweep_kernel import sweep_link
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def regressor_kernel(parents, prismatic, abc, place, axis, gravity, q, dq, ddq, out):  # type: ignore[no-untyped-def]
+def regressor_kernel(links, q, dq, ddq, out):  # type: ignore[no-untyped-def]
     """Fill `out` (10 n_v, n_v, n_t) from `q`, `dq`, `ddq` (n_v, n_t). Rows of links that do not load a joint stay."""
     n_v, n_t = q.shape
     x = np.empty(64 * 56)
@@ -31,21 +31,22 @@ def regressor_kernel(parents, prismatic, abc, place, axis, gravity, q, dq, ddq, 
     block = np.zeros((5, n_v, 64))
     for start in range(0, n_t, 64):
         size = min(64, n_t - start)
+        window = (start, size)
         load_block(start, size, q, dq, ddq, block)
         for i in range(n_v):
-            p = parents[i]
-            sweep_link(i, p, prismatic[i], abc, place, axis, gravity, block, x, state)
+            p = links[i].parent
+            sweep_link(i, links, block, x, state)
             j = p
             while j >= 0:
                 inner, outer = 384 * (n_v * p + j), 384 * (n_v * i + j)
                 seen = axes[outer : outer + 384]
                 carry_axis(axes[inner : inner + 384], seen, x)
-                _write_columns(i, j, start, size, seen, x, out)
-                j = parents[j]
+                _write_columns(i, j, window, seen, x, out)
+                j = links[j].parent
             own = 384 * (n_v * i + i)
             seen = axes[own : own + 384]
-            own_axis(axis[i, 0], axis[i, 1], axis[i, 2], prismatic[i], seen)
-            _write_columns(i, i, start, size, seen, x, out)
+            own_axis(links[i], seen)
+            _write_columns(i, i, window, seen, x, out)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
@@ -66,9 +67,10 @@ def carry_axis(inner, outer, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def own_axis(e0, e1, e2, prismatic, own):  # type: ignore[no-untyped-def]
+def own_axis(link, own):  # type: ignore[no-untyped-def]
     """Fill z, u of a link's own joint."""
-    turn = 0.0 if prismatic else 1.0
+    e0, e1, e2 = link.axis[0], link.axis[1], link.axis[2]
+    turn = 0.0 if link.prismatic else 1.0
     slide = 1.0 - turn
     for s in range(64):
         own[s] = turn * e0
@@ -80,7 +82,8 @@ def own_axis(e0, e1, e2, prismatic, own):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _write_columns(i, j, start, size, seen, x, out):  # type: ignore[no-untyped-def]
+def _write_columns(i, j, window, seen, x, out):  # type: ignore[no-untyped-def]
+    start, size = window
     for s in range(64):
         w0, w1, w2 = x[64 * 21 + s], x[64 * 22 + s], x[64 * 23 + s]
         d0, d1, d2 = x[64 * 24 + s], x[64 * 25 + s], x[64 * 26 + s]

@@ -52,7 +52,7 @@ def inertial_columns(
     """
     columns = np.zeros((10 * motion.n_v, motion.n_v, motion.n_t)) if out is None else out
     if threads == 1:
-        regressor_kernel(*tree.geometry, motion.q, motion.dq, motion.ddq, columns)
+        regressor_kernel(tree.links, motion.q, motion.dq, motion.ddq, columns)
         return columns
     edges = np.linspace(0, motion.n_t, threads + 1).astype(int)
     with ThreadPoolExecutor(threads) as pool:
@@ -81,7 +81,7 @@ def inverse_dynamics(
 def rigid_torque(tree: KernelTree, motion: Motion, inertia: FloatArray) -> FloatArray:
     """Return the rigid-body torque in kernel layout, (n_v, n_t)."""
     torque = np.empty((motion.n_v, motion.n_t))
-    newton_euler_kernel(*tree.geometry, inertia, motion.q, motion.dq, motion.ddq, torque)
+    newton_euler_kernel(tree.links, inertia, motion.q, motion.dq, motion.ddq, torque)
     return torque
 
 

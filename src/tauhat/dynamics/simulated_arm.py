@@ -123,10 +123,12 @@ class SimulatedArm:
         np.add.at(rotor, self.rotors[:, 1], standard[self.rotors[:, 0]])
         return Masses(inertia, rotor)
 
-    def passive(self, standard: FloatArray) -> tuple[NDArray[np.generic], ...]:
-        """Return kinds, joints, shapes and weights of the passive elements."""
-        kinds, joints = np.ascontiguousarray(self.elements[:, 1]), np.ascontiguousarray(self.elements[:, 2])
-        return kinds, joints, self.shapes, np.ascontiguousarray(standard[self.elements[:, 0]])
+    def passive(self, standard: FloatArray) -> NDArray[np.void]:
+        """Return the passive elements as their kernel reads them."""
+        passive = np.empty(self.shapes.size, dtype=element.ELEMENT)
+        passive["kind"], passive["joint"] = self.elements[:, 1], self.elements[:, 2]
+        passive["shape"], passive["weight"] = self.shapes, standard[self.elements[:, 0]]
+        return passive
 
 
 def simulated_arm(model: TorqueModel) -> SimulatedArm:
@@ -207,10 +209,10 @@ def follow(
     """
     n_t, n_v = reference.q.shape
     out = np.empty((4, n_v, n_t))
-    masses = arm.masses(standard)
-    body = (*kernel_tree(arm.model.robot).geometry, *masses)
+    body = (kernel_tree(arm.model.robot).links, *arm.masses(standard), arm.passive(standard))
+    task = (tuple(gains), tuple(reference), stepping[:3])
     kernel: Callable[..., tuple[int, int, int]] = _KERNELS[stepping.integrator]
-    code, sample, joint = kernel(body, arm.passive(standard), tuple(gains), tuple(reference), start, stepping[:3], out)
+    code, sample, joint = kernel(body, task, start, out)
     where = f"t = {sample * stepping.step:.4g} s"
     if code == NO_BODY:
         raise not_a_body(arm.model.robot, joint, where)

@@ -7,7 +7,7 @@ For link i with parent p, `R` from link to parent, `P` the link's origin in the 
     base       w = dw = 0,   a = -gravity
 `R(q) = A + B cos q + C sin q` for any axis (Rodrigues), so one joint costs 18 multiply-adds per sample.
 
-Layout: samples are the last, contiguous axis, in blocks of 64. All scratch of a block is one flat array indexed by literal
+`links` are those of `KernelTree`. Layout: samples are the last, contiguous axis, in blocks of 64. All scratch of a block is one flat array indexed by literal
 offsets `x[64 * slot + s]`: only then does the compiler know that nothing overlaps, and vectorises across samples.
 Slots: 0-8 R, 9-11 P, 12-20 w_p dw_p a_p of the parent, 21-29 w dw a of the link, 30-32 R'w_p; 33 and up are the callers'.
 `state` keeps slots 21-29 of every link: `state[576 * i + 64 * k + s]`.
@@ -23,9 +23,11 @@ STATE = 9 * BLOCK
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def sweep_link(i, parent, prismatic, abc, place, axis, gravity, motion, x, state):  # type: ignore[no-untyped-def]
+def sweep_link(i, links, motion, x, state):  # type: ignore[no-untyped-def]
     """Fill slots 0-32 of `x` and the link's `state` for one block; `motion` is (5, n_v, 64): cos, sin, q, dq, ddq."""
-    _pose(i, prismatic, abc, place, axis, motion, x)
+    _pose(i, links, motion, x)
+    link = links[i]
+    parent, gravity, axis = link.parent, link.gravity, link.axis
     if parent < 0:
         for s in range(64):
             for k in range(12, 18):
@@ -38,8 +40,8 @@ def sweep_link(i, parent, prismatic, abc, place, axis, gravity, motion, x, state
         for k in range(576):
             x[64 * 12 + k] = carried[k]
     _rotate_motion(x)
-    e0, e1, e2 = axis[i, 0], axis[i, 1], axis[i, 2]
-    if prismatic:
+    e0, e1, e2 = axis[0], axis[1], axis[2]
+    if link.prismatic:
         _add_prismatic(i, e0, e1, e2, motion, x)
     else:
         _add_revolute(i, e0, e1, e2, motion, x)
@@ -49,14 +51,16 @@ def sweep_link(i, parent, prismatic, abc, place, axis, gravity, motion, x, state
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _pose(i, prismatic, abc, place, axis, motion, x):  # type: ignore[no-untyped-def]
-    p0, p1, p2 = place[i, 0], place[i, 1], place[i, 2]
-    if prismatic:
-        d0 = abc[i, 0, 0] * axis[i, 0] + abc[i, 0, 1] * axis[i, 1] + abc[i, 0, 2] * axis[i, 2]
-        d1 = abc[i, 0, 3] * axis[i, 0] + abc[i, 0, 4] * axis[i, 1] + abc[i, 0, 5] * axis[i, 2]
-        d2 = abc[i, 0, 6] * axis[i, 0] + abc[i, 0, 7] * axis[i, 1] + abc[i, 0, 8] * axis[i, 2]
+def _pose(i, links, motion, x):  # type: ignore[no-untyped-def]
+    link = links[i]
+    abc, place, axis = link.abc, link.place, link.axis
+    p0, p1, p2 = place[0], place[1], place[2]
+    if link.prismatic:
+        d0 = abc[0, 0] * axis[0] + abc[0, 1] * axis[1] + abc[0, 2] * axis[2]
+        d1 = abc[0, 3] * axis[0] + abc[0, 4] * axis[1] + abc[0, 5] * axis[2]
+        d2 = abc[0, 6] * axis[0] + abc[0, 7] * axis[1] + abc[0, 8] * axis[2]
         for k in range(9):
-            r = abc[i, 0, k]
+            r = abc[0, k]
             for s in range(64):
                 x[64 * k + s] = r
         position = motion[2, i]
@@ -68,7 +72,7 @@ def _pose(i, prismatic, abc, place, axis, motion, x):  # type: ignore[no-untyped
         return
     cosine, sine = motion[0, i], motion[1, i]
     for k in range(9):
-        r0, rc, rs = abc[i, 0, k], abc[i, 1, k], abc[i, 2, k]
+        r0, rc, rs = abc[0, k], abc[1, k], abc[2, k]
         for s in range(64):
             x[64 * k + s] = r0 + rc * cosine[s] + rs * sine[s]
     for s in range(64):

@@ -11,7 +11,9 @@ from tauhat.estimation.hybrid import HybridLeastSquares
 from tauhat.estimation.identify import identify
 from tauhat.estimation.idim_iv import InstrumentalVariables
 from tauhat.estimation.least_squares import Estimator, OrdinaryLeastSquares, WeightedLeastSquares
+from tauhat.estimation.log_survey import LogFacts, LogSurvey, survey_logs
 from tauhat.estimation.losses import Bisquare, Cauchy, Huber, Loss
+from tauhat.estimation.many_logs import identify_files
 from tauhat.estimation.maximum_likelihood import MaximumLikelihood
 from tauhat.estimation.output_error import ClosedLoopInputError, ClosedLoopOutputError
 from tauhat.estimation.payload import KnownPayload, Payload, identify_payload
@@ -66,6 +68,8 @@ __all__ = [
     "KnownPayload",
     "LearnedResidual",
     "LinkConstraints",
+    "LogFacts",
+    "LogSurvey",
     "Loss",
     "MaximumLikelihood",
     "NetworkSettings",
@@ -91,9 +95,11 @@ __all__ = [
     "essential_parameters",
     "estimator_named",
     "identify",
+    "identify_files",
     "identify_payload",
     "learn_residual",
     "load_estimate",
     "select_model",
+    "survey_logs",
     "unseen_error",
 ]

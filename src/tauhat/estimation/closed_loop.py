@@ -16,6 +16,7 @@ from tauhat.errors import ModelError
 from tauhat.robots.robot import Robot
 
 _POSES = 32  # along the motion at which the mass matrix is looked at
+_EDGE = 1e-6  # of a step, by which a time may be outside the reference for rounding
 
 
 class Positions(Protocol):
@@ -62,6 +63,8 @@ class SampledReference:
 
     def __post_init__(self) -> None:
         t = frozen("t", self.t, (None,), where="reference")
+        if t.size < 2:
+            raise ModelError("too few samples", where="reference", expected="at least 2", got=t.size)
         if (np.diff(t) <= 0.0).any():
             raise ModelError("time does not increase", where="reference")
         object.__setattr__(self, "t", t)
@@ -75,6 +78,9 @@ class SampledReference:
             [np.interp(t, self.t, column) for column in signal.T] for signal in (self.q, self.dq, self.ddq)
         )  # fmt: skip
         q, dq, ddq = (np.array(rows).T for rows in columns)
+        edge = _EDGE * np.diff(self.t).min()
+        resting = (t < self.t[0] - edge) | (t > self.t[-1] + edge)
+        dq[resting], ddq[resting] = 0.0, 0.0
         return SampledReference(t=t, q=q, dq=dq, ddq=ddq)
 
 
@@ -82,7 +88,8 @@ class SampledReference:
 class ClosedLoop:
     """How the recorded robot was driven, as far as it is known.
 
-    law : with its gains; its gravity feedforward is that of the robot's nominal inertia, as the controller's would be.
+    law : with its gains; its feedforward, of gravity or of the whole model, is made of the description's own values, as
+        the controller's would be: it stays the same whatever parameters are tried.
         None: critically damped PD with the gravity of the simulated parameters, gains tuned to `bandwidth` anew for
         every set of parameters, so that the closed loop stays the same
     bandwidth : of the tuned law [Hz]

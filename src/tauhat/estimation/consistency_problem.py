@@ -26,6 +26,7 @@ from tauhat.estimation.body_coordinates import BodyCoordinates, body_coordinates
 from tauhat.estimation.evidence import Evidence
 from tauhat.estimation.physical_constraints import Box, Ellipsoid, LinkConstraints, PhysicalConstraints, Pull
 from tauhat.estimation.pseudo_inertia import SIZE, stacked
+from tauhat.estimation.solution import weighted_rows
 
 Cone: TypeAlias = Literal["zero", "nonnegative", "second order", "semidefinite"]
 
@@ -120,15 +121,10 @@ def consistency_problem(
 
 def _weighted_triangle(evidence: Evidence, weights: FloatArray) -> FloatArray:
     """Return the factor of all joints' weighted equations over the base parameters, the torque last."""
-    parts = []
-    for weight, support, factor in zip(weights, evidence.supports, evidence.total.factors, strict=True):
-        part = np.zeros((factor.shape[0], evidence.n_b + 1))
-        part[:, [*support, evidence.n_b]] = weight * factor
-        parts.append(part)
-    stack = np.vstack(parts)
-    norms = np.linalg.norm(stack, axis=0)
+    rows = weighted_rows(evidence, weights)
+    norms = np.linalg.norm(rows, axis=0)
     scale = np.where(norms > 0.0, norms, 1.0)
-    return np.asarray(np.linalg.qr(stack / scale, mode="r") * scale)
+    return np.asarray(np.linalg.qr(rows / scale, mode="r") * scale)
 
 
 def _reachable(triangle: FloatArray) -> FloatArray:

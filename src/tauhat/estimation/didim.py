@@ -17,16 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from tauhat.estimation.least_squares import degrees_of_freedom
 from tauhat.estimation.simulated_runs import SimulatedRuns, joined
+from tauhat.estimation.simulated_solution import simulated_solution
 from tauhat.estimation.simulating import Found, SimulationEstimator, Tried, merged_evidence
-from tauhat.estimation.solution import (
-    Solution,
-    honest_covariance,
-    joint_residuals,
-    joint_torques,
-    rank_and_condition,
-)
+from tauhat.estimation.solution import Solution, honest_covariance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,19 +41,5 @@ class DirectInverse(SimulationEstimator):
 
     def solution(self, runs: SimulatedRuns, tried: Tried, found: Found, ending: tuple[int, str, str]) -> Solution:
         """Return values and error bars of the last linear problem; residuals are those on the measured motion."""
-        passes, cause, advice = ending
-        rank, condition = rank_and_condition(found.evidence, found.weights)
-        return Solution(
-            values=tried.values.copy(),
-            covariance=honest_covariance(found.evidence, found.weights, tried.values, ridge=self.inner.ridge),
-            weights=found.weights,
-            joint_rms=joint_residuals(runs.problem.evidence, tried.values),
-            torque_rms=joint_torques(runs.problem.evidence),
-            rank=rank,
-            condition=condition,
-            degrees=degrees_of_freedom(found.evidence),
-            passes=passes,
-            cause=cause,
-            advice=advice,
-            evidence=found.evidence,
-        )
+        covariance = honest_covariance(found.evidence, found.weights, tried.values, ridge=self.inner.ridge)
+        return simulated_solution(runs, tried, found, ending, covariance=covariance)

@@ -27,6 +27,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, IntArray, frozen
 from tauhat.blas import single_threaded
 from tauhat.errors import ModelError
+from tauhat.estimation.confidence import student_quantile
 from tauhat.estimation.estimate import Estimate
 from tauhat.estimation.evidence import Block, Evidence, collect_all
 from tauhat.estimation.gain_fit import Jackknifed, jackknifed, ordinary_solution, total_solution
@@ -90,10 +91,7 @@ class DriveCalibration:
 
     def half_intervals(self, *, confidence: float = 0.95) -> FloatArray:
         """Return half of each factor's confidence interval, (n_v,), by Student's t."""
-        from scipy.special import stdtrit
-
-        quantile = float(stdtrit(max(1, self.degrees), 0.5 + 0.5 * confidence))
-        return np.asarray(quantile * self.total.standard_errors)
+        return np.asarray(student_quantile(self.degrees, confidence=confidence) * self.total.standard_errors)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""

@@ -16,6 +16,7 @@ from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.motion import motion_from_rows
 from tauhat.errors import EstimateError, TauhatError
+from tauhat.estimation.confidence import student_quantile
 from tauhat.estimation.friction import SteadyFriction, steady_friction
 from tauhat.estimation.structure import Structure
 from tauhat.files import read_text, replace_file
@@ -158,9 +159,7 @@ class Estimate:
 
     def half_intervals(self, *, confidence: float = 0.95) -> FloatArray:
         """Return half of each base parameter's confidence interval, (n_b,), by Student's t."""
-        from scipy.special import stdtrit
-
-        return np.asarray(float(stdtrit(max(1, self.degrees), 0.5 + 0.5 * confidence)) * self.standard_errors)
+        return np.asarray(student_quantile(self.degrees, confidence=confidence) * self.standard_errors)
 
     @property
     def relative_rms(self) -> float:

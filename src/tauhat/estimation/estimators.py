@@ -56,6 +56,7 @@ _METHODS: tuple[type[Estimator], ...] = (
     SequentialLeastSquares,
 )
 ESTIMATORS: dict[str, type[Estimator]] = {method.key: method for method in _METHODS}
+"""Every estimator by its name."""
 
 
 def estimator_named(key: str) -> Estimator:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.base import BaseParameters
@@ -39,9 +40,13 @@ def steady_friction(
     for joint in range(model.robot.n_v):
         alone = np.where(np.arange(model.robot.n_v) == joint, speeds, 0.0)
         rows[joint] = 0.5 * (_columns_at(model, base, alone) - _columns_at(model, base, -alone))[joint]
-    dissipates = np.array([term.dissipates for term in model.terms for _ in term.parameters(model.robot)])
-    rows *= dissipates[base.independent]
+    rows *= braking_parameters(model)[base.independent]
     return SteadyFriction(rows @ values, np.sqrt(np.einsum("jk,kl,jl->j", rows, covariance, rows)))
+
+
+def braking_parameters(model: TorqueModel) -> NDArray[np.bool_]:
+    """Return which standard parameters belong to terms that dissipate, (n_p,)."""
+    return np.array([term.dissipates for term in model.terms for _ in term.parameters(model.robot)])
 
 
 def _columns_at(model: TorqueModel, base: BaseParameters, speeds: FloatArray) -> FloatArray:

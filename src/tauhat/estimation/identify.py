@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tauhat.arrays import FloatArray, read_only
 from tauhat.blas import single_threaded
 from tauhat.dynamics.base import base_parameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.errors import TauhatWarning
-from tauhat.estimation.estimate import Estimate, input_log
+from tauhat.estimation.estimate import Estimate, InputLog, input_log
 from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.iterating import iterated
 from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
@@ -69,28 +71,70 @@ def identify(
     settled = iterated(settled, recordings, settings, method)
     base = base_parameters(settled)
     evidence = collect_all(settled, base, recordings, settings)
-    problem = method.settled(
-        Problem(model=settled, base=base, recordings=tuple(recordings), processing=settings, evidence=evidence)
+    problem = Problem(model=settled, base=base, recordings=tuple(recordings), processing=settings, evidence=evidence)
+    return concluded(problem, method, seen_in(recordings), constraints=constraints)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Seen:
+    """What an estimate notes of the recordings it was fitted on, and what its warnings are made of.
+
+    inputs : one a recording
+    top_speeds : (n_v,) of the joints in all of them [rad/s or m/s]
+    moves : (n_v,) whether the joint moves in any of them
+    joint_names : of the log
+    """
+
+    inputs: tuple[InputLog, ...]
+    top_speeds: FloatArray
+    moves: NDArray[np.bool_]
+    joint_names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        read_only(self.top_speeds)
+        self.moves.setflags(write=False)
+
+
+def seen_in(recordings: Sequence[Recording]) -> Seen:
+    """Return what is noted of recordings."""
+    return Seen(
+        inputs=tuple(input_log(recording) for recording in recordings),
+        top_speeds=top_speeds(recordings),
+        moves=np.any([moving_joints(recording) for recording in recordings], axis=0),
+        joint_names=recordings[0].joint_names,
     )
+
+
+def concluded(
+    problem: Problem, method: Estimator, seen: Seen, *, constraints: PhysicalConstraints | None = None
+) -> Estimate:
+    """Return the estimate that a method makes of a problem whose model and processing are settled.
+
+    Warns
+    -----
+    TauhatWarning
+        as `identify`.
+    """
+    problem = method.settled(problem)
     solution = method.fit_problem(problem)
-    _warn_of_still_joints(recordings)
-    estimate = _estimate(problem, solution, method)
+    _warn_of_still_joints(seen)
+    estimate = _estimate(problem, solution, method, seen)
     if constraints is not None:
         estimate = _made_physical(estimate, problem.evidence, solution, constraints)
     warn_of_weak_motion(problem.evidence, solution, estimate)
-    _warn_of_negative_friction(estimate, recordings)
+    _warn_of_negative_friction(estimate, seen)
     return estimate
 
 
-def _estimate(problem: Problem, solution: Solution, method: Estimator) -> Estimate:
+def _estimate(problem: Problem, solution: Solution, method: Estimator, seen: Seen) -> Estimate:
     kept = {field.name for field in fields(Solution)} & {field.name for field in fields(Estimate)}
     return Estimate(
         model=problem.model,
         base=problem.base,
         processing=problem.processing,
         estimator={"name": method.key, **method.settings()},
-        inputs=tuple(input_log(recording) for recording in problem.recordings),
-        top_speeds=top_speeds(problem.recordings),
+        inputs=seen.inputs,
+        top_speeds=seen.top_speeds,
         **{name: getattr(solution, name) for name in kept},
     )
 
@@ -120,7 +164,7 @@ def _made_physical(
                 f"{100 * freer.cost:.1f} %: it is not kept; the torque lacks the rotors' share (measured "
                 "behind the gear, or compensated by the controller)",
                 TauhatWarning,
-                stacklevel=4,
+                stacklevel=5,
             )
             found, kept = freer, freed
     return replace(
@@ -153,22 +197,21 @@ def warn_of_weak_motion(evidence: Evidence, solution: Solution, estimate: Estima
         )
 
 
-def _warn_of_still_joints(recordings: Sequence[Recording]) -> None:
+def _warn_of_still_joints(seen: Seen) -> None:
     """Warn of joints that only flicker: columns of noise look well conditioned and make parameters of nothing."""
-    moves = np.any([moving_joints(recording) for recording in recordings], axis=0)
-    if not moves.all():
-        still = [name for name, moved in zip(recordings[0].joint_names, moves, strict=True) if not moved]
+    if not seen.moves.all():
+        still = [name for name, moved in zip(seen.joint_names, seen.moves, strict=True) if not moved]
         warnings.warn(
             f"no motion of {', '.join(still)} in any recording: friction and rotor inertia there are fitted to encoder "
             "noise and predict nothing; record a motion that moves every joint, or lock those that stand still",
             TauhatWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 
-def _warn_of_negative_friction(estimate: Estimate, recordings: Sequence[Recording]) -> None:
+def _warn_of_negative_friction(estimate: Estimate, seen: Seen) -> None:
     """Warn when friction drives most joints at both a fifth and three fifths of their top speeds."""
-    speeds = np.maximum(top_speeds(recordings), np.finfo(float).tiny)
+    speeds = np.maximum(seen.top_speeds, np.finfo(float).tiny)
     levels = [estimate.friction(part * speeds).torque for part in (0.2, 0.6)]
     negative = np.flatnonzero((np.array(levels) < 0.0).all(axis=0))
     if negative.size > estimate.robot.n_v / 2:
@@ -177,5 +220,5 @@ def _warn_of_negative_friction(estimate: Estimate, recordings: Sequence[Recordin
             f"friction is negative on {negative.size} of {estimate.robot.n_v} joints ({numbers}): the torque is "
             "probably logged with the sign reversed; set `sign = -1` in the map's [torque] section",
             TauhatWarning,
-            stacklevel=3,
+            stacklevel=4,
         )

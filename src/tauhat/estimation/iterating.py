@@ -1,25 +1,39 @@
 """Terms whose columns depend on what the fit finds: the load on a joint, from the pass before.
 
 A joint keeps its load friction only where the recordings show it: its coefficient must have the sign of friction.
+Rotors that are regrouped into links do not load the gear; what of their sum they have is found pass by pass, too
+(`rotor_load`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
-from tauhat.dynamics.terms import INERTIAL_SYMBOLS, JointTerm, Term
-from tauhat.estimation.evidence import Evidence, collect_all
+from tauhat.dynamics.terms import INERTIAL_SYMBOLS, JointTerm, LoadCoulomb, LoadDahl, Term
+from tauhat.estimation.evidence import Evidence, Gather, collect_all, gathering
 from tauhat.estimation.least_squares import Estimator
+from tauhat.estimation.problem import Problem
+from tauhat.estimation.rotor_load import (
+    hidden_rotors,
+    load_term,
+    rigid_parameters,
+    rotor_load,
+    standard_with_rotors,
+    with_rotors,
+)
+from tauhat.estimation.shape_uncertainty import rotor_moves
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 
 _PASSES = 2
+_ROTOR_PASSES = 1  # more, where rotors are regrouped into links
 
 
 def first_loaded(
@@ -35,55 +49,101 @@ def first_loaded(
         return model
     base = base_parameters(others)
     evidence = collect_all(others, base, recordings, processing, most_blocks=1)
-    return _loaded(model, others, _standard(base, estimator.solve(evidence).values))
+    standard = standard_with_rotors(others, base, estimator.solve(evidence).values)
+    return _loaded(model, others, standard, rotors=np.zeros(model.robot.n_v))
 
 
 def iterated(
-    model: TorqueModel, recordings: Sequence[Recording], processing: Processing, estimator: Estimator
+    model: TorqueModel,
+    recordings: Sequence[Recording],
+    processing: Processing,
+    estimator: Estimator,
+    *,
+    gather: Gather | None = None,
 ) -> TorqueModel:
-    """Return the model with its iterated terms settled; the model itself when it has none."""
+    """Return the model with its iterated terms settled; the model itself when it has none.
+
+    Parameters
+    ----------
+    gather : makes the evidence where the recordings are not here; each pass asks for it anew
+    """
     if not any(term.iterated for term in model.terms):
         return model
     for _ in range(_PASSES):
-        base = base_parameters(model)
-        evidence = collect_all(model, base, recordings, processing, most_blocks=1)
-        standard, driving = _without_driving(model, base, evidence, estimator)
-        model = _loaded(_left(model, driving), model, standard)
+        model = _next_pass(model, recordings, processing, estimator=estimator, gather=gather)
+    for _ in range(_ROTOR_PASSES if _has_rotors(model) else 0):
+        model = _next_pass(model, recordings, processing, estimator=estimator, gather=gather)
     return model
 
 
-def rigid_parameters(model: TorqueModel, standard: FloatArray) -> FloatArray:
-    """Return the inertial parameters among `standard` (n_p,), link by link, (n_v, 10); zero where there is none."""
-    inertia = np.zeros((model.robot.n_v, len(INERTIAL_SYMBOLS)))
-    for parameter, value in zip(model.parameters, standard, strict=True):
-        if parameter.symbol in INERTIAL_SYMBOLS:
-            inertia[parameter.joint, INERTIAL_SYMBOLS.index(parameter.symbol)] = value
-    return inertia
+def _has_rotors(model: TorqueModel) -> bool:
+    return any(term.rotors for term in model.terms if isinstance(term, LoadCoulomb | LoadDahl))
 
 
 def _has_bodies(model: TorqueModel) -> bool:
     return any(parameter.symbol in INERTIAL_SYMBOLS for parameter in model.parameters)
 
 
-def _loaded(model: TorqueModel, fitted: TorqueModel, standard: FloatArray) -> TorqueModel:
+def _loaded(model: TorqueModel, fitted: TorqueModel, standard: FloatArray, *, rotors: FloatArray) -> TorqueModel:
     """Return the model whose iterated terms know the rigid bodies that were fitted, where there were any."""
     if not _has_bodies(fitted):
         return model
     inertia = rigid_parameters(fitted, standard)
-    return replace(model, terms=tuple(term.after(inertia) for term in model.terms))
+    return replace(model, terms=tuple(term.after(inertia, rotors) for term in model.terms))
 
 
-def _standard(base: BaseParameters, values: FloatArray) -> FloatArray:
-    """Return standard parameters that load the joints as the base parameters do: the regrouped ones are zero."""
-    standard = np.zeros(len(base.names))
-    standard[base.independent] = values
-    return standard
+class _Fitted(NamedTuple):
+    """A fit without load friction that drives its joint.
+
+    values : (n_b,), zero for what was left out
+    weights : (n_v,) of the joints' equations
+    driving : parameters that were left out
+    """
+
+    values: FloatArray
+    weights: FloatArray
+    driving: IntArray
 
 
-def _without_driving(
-    model: TorqueModel, base: BaseParameters, evidence: Evidence, estimator: Estimator
-) -> tuple[FloatArray, IntArray]:
-    """Return the standard parameters of a fit without load friction that drives its joint, and the ones left out.
+def _next_pass(
+    model: TorqueModel,
+    recordings: Sequence[Recording],
+    processing: Processing,
+    *,
+    estimator: Estimator,
+    gather: Gather | None,
+) -> TorqueModel:
+    """Return the model with the load that a fit finds."""
+    base = base_parameters(model)
+    evidence = (gather or gathering(recordings, processing))(model, base, 1)
+    fitted = _without_driving(model, base, evidence, estimator)
+    problem = Problem(
+        model=model, base=base, recordings=tuple(recordings), processing=processing, evidence=evidence, gather=gather
+    )
+    rotors = _rotors(problem, fitted)
+    standard = standard_with_rotors(with_rotors(model, rotors), base, fitted.values)
+    return _loaded(_left(model, fitted.driving), model, standard, rotors=rotors)
+
+
+def _rotors(problem: Problem, fitted: _Fitted) -> FloatArray:
+    """Return the regrouped rotors (n_v,) one step nearer to where load friction fits best; no body goes negative."""
+    model, base, term = problem.model, problem.base, load_term(problem.model)
+    rotors = np.zeros(model.robot.n_v)
+    slope = rotor_load(model, base, fitted.values)
+    if slope is None:
+        return rotors
+    if term is not None and term.rotors:
+        rotors += term.rotors
+    moves = rotor_moves(problem, slope, values=fitted.values, weights=fitted.weights)
+    most = np.zeros(model.robot.n_v)
+    for rotor, move in zip(hidden_rotors(model, base, fitted.values), moves, strict=True):
+        most[rotor.joint] = rotor.most
+        rotors[rotor.joint] += move * rotor.most
+    return np.clip(rotors, 0.0, most)
+
+
+def _without_driving(model: TorqueModel, base: BaseParameters, evidence: Evidence, estimator: Estimator) -> _Fitted:
+    """Return a fit without load friction that drives its joint.
 
     What is left may change its sign when the others go, so that the fit is repeated until none of it is negative.
     """
@@ -91,11 +151,12 @@ def _without_driving(
     may_go = np.array([_can_leave(term) for term in model.terms], dtype=np.bool_)[own[base.independent]]
     columns = np.arange(base.n_b)
     while True:
+        solved = estimator.solve(evidence.keeping(columns))
         values = np.zeros(base.n_b)
-        values[columns] = estimator.solve(evidence.keeping(columns)).values
+        values[columns] = solved.values
         left = columns[~(may_go & (values < 0.0))[columns]]
         if left.size == columns.size:
-            return _standard(base, values), np.setdiff1d(base.independent, base.independent[columns])
+            return _Fitted(values, solved.weights, np.setdiff1d(base.independent, base.independent[columns]))
         columns = left
 
 

@@ -7,7 +7,6 @@ grows with the load must feel the payload, too: its columns are made with the ri
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +18,7 @@ from tauhat.dynamics.selection import in_terms_of
 from tauhat.dynamics.terms import Inertia
 from tauhat.errors import ModelError
 from tauhat.estimation.estimate import Estimate
-from tauhat.estimation.evidence import Evidence
-from tauhat.estimation.iterating import rigid_parameters
+from tauhat.estimation.rotor_load import load_term, rigid_parameters, standard_with_rotors
 
 TEN = 10  # inertial parameters of a body
 _PURE = 1e-6  # weight below which another parameter does not come with one
@@ -127,18 +125,8 @@ def loaded_model(estimate: Estimate, values: FloatArray, payload: FloatArray, li
     payload : (10,) inertial parameters about the origin of the link's frame
     """
     model = estimate.model
-    standard = np.zeros(model.n_p)
-    standard[estimate.base.independent] = values
-    inertia = rigid_parameters(model, standard).copy()
+    inertia = rigid_parameters(model, standard_with_rotors(model, estimate.base, values))
     inertia[link] += payload
-    return replace(model, terms=tuple(term.after(inertia) if term.iterated else term for term in model.terms))
-
-
-def weighted_rows(evidence: Evidence, weights: Sequence[float] | FloatArray) -> FloatArray:
-    """Return all joints' weighted factors over all parameters, the torque last: (n, n_b + 1)."""
-    parts = []
-    for weight, support, factor in zip(weights, evidence.supports, evidence.total.factors, strict=True):
-        part = np.zeros((factor.shape[0], evidence.n_b + 1))
-        part[:, [*support, evidence.n_b]] = weight * factor
-        parts.append(part)
-    return np.vstack(parts)
+    loaded = load_term(model)
+    rotors = np.array(loaded.rotors) if loaded is not None else None
+    return replace(model, terms=tuple(term.after(inertia, rotors) if term.iterated else term for term in model.terms))

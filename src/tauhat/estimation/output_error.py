@@ -27,21 +27,17 @@ from tauhat.dynamics.model import Layout
 from tauhat.dynamics.simulated_arm import Moved
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence, evidence_from_rows
-from tauhat.estimation.least_squares import WeightedLeastSquares, degrees_of_freedom
+from tauhat.estimation.least_squares import WeightedLeastSquares
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.rows import Rows
 from tauhat.estimation.simulated_runs import Run, SimulatedRuns
+from tauhat.estimation.simulated_solution import simulated_solution
 from tauhat.estimation.simulating import Found, SimulationEstimator, Tried
-from tauhat.estimation.solution import (
-    Solution,
-    honest_covariance,
-    joint_residuals,
-    joint_torques,
-    rank_and_condition,
-)
+from tauhat.estimation.solution import Solution, honest_covariance, joint_torques
 from tauhat.recordings.filters import filtered
 
 _BY_RESIDUAL = WeightedLeastSquares(power=1.0)
+_WEAKEST = 1e-3  # of the largest torque: a joint with less is taken to have that much
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,22 +86,8 @@ class OutputError(SimulationEstimator):
 
     def solution(self, runs: SimulatedRuns, tried: Tried, found: Found, ending: tuple[int, str, str]) -> Solution:
         """Return values and error bars of the last linear problem; residuals are those of the torque."""
-        passes, cause, advice = ending
-        rank, condition = rank_and_condition(found.evidence, found.weights)
-        return Solution(
-            values=tried.values.copy(),
-            covariance=honest_covariance(found.evidence, found.weights, found.values, ridge=0.0),
-            weights=found.weights,
-            joint_rms=joint_residuals(runs.problem.evidence, tried.values),
-            torque_rms=joint_torques(runs.problem.evidence),
-            rank=rank,
-            condition=condition,
-            degrees=degrees_of_freedom(found.evidence),
-            passes=passes,
-            cause=cause,
-            advice=advice,
-            evidence=found.evidence,
-        )
+        covariance = honest_covariance(found.evidence, found.weights, found.values, ridge=0.0)
+        return simulated_solution(runs, tried, found, ending, covariance=covariance)
 
     def _linear(self, runs: SimulatedRuns, run: Run, values: FloatArray, around: tuple[Moved, FloatArray]) -> Evidence:
         """Return the evidence of `J x_new = e + J x` of one run."""
@@ -200,6 +182,7 @@ class ClosedLoopInputError(OutputError):
 def _scales(evidence: Evidence) -> FloatArray:
     """Return for each parameter the change that alters the torque of the joint it loads most by its whole size."""
     torque = joint_torques(evidence)
+    torque = np.maximum(torque, _WEAKEST * torque.max())
     share = np.zeros(evidence.n_b)
     for joint, (support, factor) in enumerate(zip(evidence.supports, evidence.total.factors, strict=True)):
         column = np.linalg.norm(factor[:, :-1], axis=0) / np.sqrt(evidence.n_t)

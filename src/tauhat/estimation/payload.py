@@ -19,6 +19,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, frozen
 from tauhat.blas import single_threaded
 from tauhat.errors import ModelError, TauhatWarning
+from tauhat.estimation.confidence import student_quantile
 from tauhat.estimation.estimate import Estimate
 from tauhat.estimation.evidence import collect_all
 from tauhat.estimation.loaded_run import TEN, payload_columns
@@ -128,9 +129,7 @@ class Payload:
 
     @property
     def _quantile(self) -> float:
-        from scipy.special import stdtrit
-
-        return float(stdtrit(max(1, self.degrees), 0.975))
+        return student_quantile(self.degrees)
 
     @property
     def relative_rms(self) -> float:

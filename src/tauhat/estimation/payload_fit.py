@@ -17,8 +17,8 @@ from tauhat.dynamics.model import TorqueModel
 from tauhat.estimation.estimate import Estimate, input_log
 from tauhat.estimation.evidence import Block, Evidence, collect_all
 from tauhat.estimation.least_squares import WeightedLeastSquares
-from tauhat.estimation.loaded_run import TEN, PayloadColumns, loaded_model, weighted_rows
-from tauhat.estimation.solution import Solution, joint_residuals, joint_torques
+from tauhat.estimation.loaded_run import TEN, PayloadColumns, loaded_model
+from tauhat.estimation.solution import Solution, joint_residuals, joint_torques, weighted_rows
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot

@@ -8,6 +8,10 @@ the past shrink by `0.5^(dt / 2H)` (their squares by `0.5^(dt / H)`), and new ro
 Each row is forgotten by its own age, so that the result does not depend on how the stream is cut. Joints' weights
 follow from the remembered residuals, as in weighted least squares; without forgetting it is just that.
 
+Error bars: rows of weights w are worth `n = (sum w)^2 / sum w^2` whole ones (Kish). Steady excitation and white
+residuals of variance `s^2 = sum w e^2 / sum w` then make the covariance `s^2 (sum w^2 / sum w) (A'WA)^-1`, and of the
+groups of time of the jackknife the same share counts as of the rows.
+
 Source: Bierman, "Factorization methods for discrete sequential estimation", 1977, ch. 5; Ljung, "System
 identification", 1999, ch. 11.
 """
@@ -55,6 +59,14 @@ class Memory:
     seen: int
 
 
+class _Worth(NamedTuple):
+    """How many whole rows the remembered ones are worth, per joint; the sums of their weights, and of these squared."""
+
+    rows: float
+    total: float
+    squares: float
+
+
 class Track(NamedTuple):
     """Parameters along time.
 
@@ -98,21 +110,24 @@ class RecursiveLeastSquares(Estimator):
         if self.half_life is None:
             return self._weighted.fit(problem.evidence)
         check_rows(problem.evidence)
-        faded = self.faded(repeated_rows(problem))
+        rows = repeated_rows(problem)
+        worth = self._worth(rows)
+        faded = self.faded(rows)
         solved = self._weighted.solve(faded)
         rank, condition = rank_and_condition(faded, solved.weights)
         left = np.exp2(-_starts(problem)[-1] * self.rate)
+        spread = _variance(faded, solved, worth)
         return Solution(
             values=solved.values,
-            covariance=honest_covariance(faded, solved.weights, solved.values, ridge=self.ridge),
+            covariance=honest_covariance(faded, solved.weights, solved.values, ridge=self.ridge, variance=spread),
             weights=solved.weights,
             joint_rms=joint_residuals(problem.evidence, solved.values),
             torque_rms=joint_torques(problem.evidence),
             rank=rank,
             condition=condition,
-            degrees=degrees_of_freedom(faded),
+            degrees=max(1, round((degrees_of_freedom(faded) + 1) * worth.rows / faded.n_t) - 1),
             passes=solved.passes,
-            cause=f"solved at the end; of the first row {100 * left:.2g} % is left",
+            cause=f"solved at the end; of the first row {float(f'{100 * left:.2g}'):g} % is left",
             evidence=faded,
         )
 
@@ -178,12 +193,41 @@ class RecursiveLeastSquares(Estimator):
         starts, n_v = _starts(rows.problem), len(rows.places)
         return rows.weighted(lambda piece, index: np.tile(self._left(piece.t + starts[index], starts[-1]), (n_v, 1)))
 
+    def _worth(self, rows: RepeatedRows) -> _Worth:
+        """Return what the remembered rows are worth.
+
+        Raises
+        ------
+        ModelError
+            when that is no more than there are parameters.
+        """
+        starts, evidence = _starts(rows.problem), rows.problem.evidence
+        total, squares = 0.0, 0.0
+        for index, pieces in enumerate(rows.recordings()):
+            for piece in pieces:
+                left = np.exp2((piece.t + starts[index] - starts[-1]) * self.rate)
+                total, squares = total + float(left.sum()), squares + float(left @ left)
+        if evidence.n_v * total <= evidence.n_b:
+            raise ModelError(
+                f"a half-life of {self.half_life:g} s leaves {evidence.n_v * total:.2g} filtered rows, which cannot "
+                f"determine {evidence.n_b} base parameters",
+                remedy="remember longer",
+            )
+        return _Worth(total**2 / squares, total, squares)
+
     def _left(self, t: FloatArray, end: float) -> FloatArray:
         return np.maximum(np.exp2((t - end) * self.rate), _LEAST)
 
     @property
     def _weighted(self) -> WeightedLeastSquares:
         return WeightedLeastSquares(power=self.power, ridge=self.ridge)
+
+
+def _variance(faded: Evidence, solved: Solved, worth: _Worth) -> float:
+    """Return the variance of the weighted residuals, made for the faded rows' own bend; see the head of this file."""
+    squares = float(np.sum((solved.weights * joint_residuals(faded, solved.values)) ** 2)) * faded.n_t
+    free = max(1.0, faded.n_v * worth.rows - faded.n_b) / worth.rows
+    return squares / worth.total / free * worth.squares / worth.total
 
 
 def _starts(problem: Problem) -> FloatArray:

@@ -25,7 +25,7 @@ from tauhat.blas import single_threaded
 from tauhat.errors import MissingExtraError, ModelError
 from tauhat.estimation.estimate import Estimate
 from tauhat.estimation.evidence import evidence_from_rows
-from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
+from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares, check_rows
 from tauhat.estimation.residual_network import ResidualNetwork
 from tauhat.estimation.rows import Rows, check_recordings, filtered_rows
 from tauhat.recordings.processing import clock_step, stretches
@@ -104,6 +104,8 @@ def learn_residual(
         when scikit-learn is not installed.
     RecordingError
         when a recording does not fit the robot or lacks torque.
+    ModelError
+        when the parts that are not left out have no more rows than the model has parameters.
     """
     _require_library()
     check_recordings(estimate.model, recordings)
@@ -187,7 +189,10 @@ def _motion_at(estimate: Estimate, recording: Recording, times: FloatArray) -> F
 
 
 def _in_time(samples: _Samples) -> Iterator[_Samples]:
-    for part in np.array_split(np.arange(samples.rows.t.size), _PARTS):
+    rows = samples.rows.t.size
+    if rows < _PARTS:
+        raise ModelError("too few rows to leave some of them out", expected=f">= {_PARTS}", got=rows)
+    for part in np.array_split(np.arange(rows), _PARTS):
         yield samples.taken(part)
 
 
@@ -205,6 +210,7 @@ def _falls(
         others = _joined([other for number, other in enumerate(parts) if number != index])
         layout = estimate.model.layout(estimate.base.independent)
         evidence = evidence_from_rows(layout, estimate.base, [others.rows], most_blocks=1)
+        check_rows(evidence)
         values = estimator.solve(evidence).values
         network = _trained(others, values, settings)
         before = part.residual(values)

@@ -20,12 +20,12 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Block, Evidence
 from tauhat.estimation.filters.outcome import Recursion
+from tauhat.estimation.friction import braking_parameters
 from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.segments import (
@@ -37,7 +37,7 @@ from tauhat.estimation.segments import (
     reversals,
     tracks,
 )
-from tauhat.estimation.solution import Solution, joint_residuals, joint_torques, rank_and_condition
+from tauhat.estimation.solution import Solution, joint_residuals, joint_torques, rank_and_condition, stacked
 
 _APART = 1e3  # scaled condition number of the segments above which friction parameters are not told apart
 _SMOOTH = 0.2  # part of a column that must be left about a reversal when its cubic is taken out
@@ -160,10 +160,7 @@ def _friction_evidence(
     problem: Problem, pairs: list[tuple[Contrast, ...]], turns: list[Reversal]
 ) -> tuple[Evidence, IntArray]:
     """Return the evidence of the segments on the friction parameters they tell, one block a segment, and which."""
-    dissipates = np.array(
-        [term.dissipates for term in problem.model.terms for _ in term.parameters(problem.model.robot)]
-    )
-    friction = np.flatnonzero(dissipates[problem.base.independent])
+    friction = np.flatnonzero(braking_parameters(problem.model)[problem.base.independent])
     if not friction.size:
         raise ModelError("the model has no friction to identify first", remedy="add viscous and coulomb")
     n_v = problem.model.robot.n_v
@@ -299,11 +296,6 @@ def _without(evidence: Evidence, own: IntArray, values: FloatArray) -> Evidence:
 
 def _carried(evidence: Evidence, own: IntArray, rest: IntArray, weights: FloatArray) -> FloatArray:
     """Return how the other parameters move with those held, (n_rest, n_own)."""
-    parts = []
-    for weight, factor, support in zip(weights, evidence.total.factors, evidence.supports, strict=True):
-        part: NDArray[np.float64] = np.zeros((factor.shape[0], evidence.n_b))
-        part[:, support] = weight * factor[:, :-1]
-        parts.append(part)
-    whole = np.vstack(parts)
+    whole, _ = stacked(evidence, evidence.total, weights)
     scale = np.linalg.norm(whole[:, rest], axis=0)
     return np.asarray(-np.linalg.lstsq(whole[:, rest] / scale, whole[:, own], rcond=None)[0] / scale[:, None])

@@ -4,13 +4,16 @@ A width, a speed or a length that was chosen on the same recordings is not known
 less sure than if it were. To first order a shape s adds one unknown, `d ln s`, with the column `d(Y x)/d ln s`, which
 the covariance is taken with (variable projection; Golub, Pereyra 1973). A shape is known beforehand to a factor of
 about `e^PRIOR`: without that, a term whose coefficient is zero would leave its shape, and so its neighbours, unbounded.
+
+The same holds for the rotors that are regrouped into links: how much of their sum the rotor has is found by friction
+that grows with the load alone (`rotor_load`), and is an unknown beside it, known beforehand to `PRIOR` of the sum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
@@ -19,8 +22,9 @@ from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.motion import Motion
 from tauhat.dynamics.terms import Parameter, ShapedTerm, Term
-from tauhat.estimation.evidence import Block, Evidence, collect_all
+from tauhat.estimation.evidence import Block, Evidence
 from tauhat.estimation.problem import Problem
+from tauhat.estimation.rotor_load import RotorLoad, rotor_load
 from tauhat.estimation.solution import Solution, honest_covariance, joint_residuals, solve
 from tauhat.robots.robot import Robot
 
@@ -78,15 +82,19 @@ class ShapeSlope(Term):
         return tuple(row[None] if own.size else empty for row, own in zip(made, supports, strict=True)), after
 
 
+Slope: TypeAlias = ShapeSlope | RotorLoad
+
+
 def covariance_with_shapes(problem: Problem, solution: Solution, *, ridge: float = 0.0) -> FloatArray:
-    """Return the covariance of the base parameters with the shapes of the model's terms among the unknowns, (n_b, n_b).
+    """Return the covariance of the base parameters, (n_b, n_b), with shapes and regrouped rotors among the unknowns.
 
     Parameters
     ----------
     solution : of the problem; its own covariance takes the shapes as known, and is returned where there are none
     ridge : of the estimator
     """
-    slopes = _slopes(problem, solution)
+    rotors = rotor_load(problem.model, problem.base, solution.values)
+    slopes: tuple[Slope, ...] = (*_slopes(problem, solution), *(() if rotors is None else (rotors,)))
     if not slopes:
         return solution.covariance
     evidence = _widened(problem, slopes)
@@ -96,7 +104,7 @@ def covariance_with_shapes(problem: Problem, solution: Solution, *, ridge: float
     evidence = evidence.keeping(kept)
     if kept.size == n_b:
         return solution.covariance
-    known = _with_prior(evidence, n_b, solution)
+    known = _with_prior(evidence, n_b, solution.values)
     values = solve(known, solution.weights, ridge=ridge)
     wide = honest_covariance(known, solution.weights, values, ridge=ridge)[:n_b, :n_b]
     spread = np.sqrt(np.maximum(np.diag(wide), np.diag(solution.covariance)) / np.diag(wide))
@@ -110,16 +118,10 @@ def nearer_shapes(problem: Problem, solution: Solution, keys: Collection[str]) -
     by more than a factor of 1.4.
     """
     slopes = tuple(slope for slope in _slopes(problem, solution) if slope.term.key in keys)
-    model, n_b = problem.model, problem.base.n_b
+    model = problem.model
     if not slopes:
         return model
-    evidence = _widened(problem, slopes)
-    sizes = _column_sizes(evidence)
-    kept = np.flatnonzero((np.arange(evidence.n_b) < n_b) | (sizes > _FAINT * sizes[:n_b].max()))
-    known = _with_prior(evidence.keeping(kept), n_b, solution)
-    moves = np.zeros(evidence.n_b)
-    moves[kept] = solve(known, solution.weights, ridge=_RIDGE)
-    start = n_b
+    moves, start = _moves(problem, slopes, values=solution.values, weights=solution.weights), 0
     for slope in slopes:
         present = slope.term.present(model.robot)
         factors = np.ones(model.robot.n_v)
@@ -127,6 +129,29 @@ def nearer_shapes(problem: Problem, solution: Solution, keys: Collection[str]) -
         start += present.size
         model = model.with_term(slope.term.with_shape((factors * slope.term.shape).tolist()))
     return model
+
+
+def rotor_moves(problem: Problem, rotors: RotorLoad, *, values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return by how much more of the regrouped numbers the rotors have than the load says, in parts, (n_rotors,).
+
+    One Gauss-Newton step on all coefficients and all rotors together.
+
+    Parameters
+    ----------
+    values, weights : (n_b,), (n_v,) of the fit with the load as it is
+    """
+    return _moves(problem, (rotors,), values=values, weights=weights)
+
+
+def _moves(problem: Problem, slopes: Sequence[Slope], *, values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the Gauss-Newton step of the unknowns behind the base parameters; zero where they hardly act."""
+    evidence, n_b = _widened(problem, slopes), problem.base.n_b
+    sizes = _column_sizes(evidence)
+    kept = np.flatnonzero((np.arange(evidence.n_b) < n_b) | (sizes > _FAINT * sizes[:n_b].max()))
+    known = _with_prior(evidence.keeping(kept), n_b, values)
+    moves = np.zeros(evidence.n_b)
+    moves[kept] = solve(known, weights, ridge=_RIDGE)
+    return moves[n_b:]
 
 
 def _slopes(problem: Problem, solution: Solution) -> tuple[ShapeSlope, ...]:
@@ -143,8 +168,8 @@ def _slopes(problem: Problem, solution: Solution) -> tuple[ShapeSlope, ...]:
     return tuple(slopes)
 
 
-def _widened(problem: Problem, slopes: Sequence[ShapeSlope]) -> Evidence:
-    """Return the evidence on the base parameters and, behind them, the shapes."""
+def _widened(problem: Problem, slopes: Sequence[Slope]) -> Evidence:
+    """Return the evidence on the base parameters and, behind them, the shapes and rotors."""
     model, base = problem.model, problem.base
     added = _Bundle(slopes=tuple(slopes))
     wide = replace(model, terms=(*model.terms, added))
@@ -158,7 +183,7 @@ def _widened(problem: Problem, slopes: Sequence[ShapeSlope]) -> Evidence:
         regrouping=np.zeros((kept.size, 0)),
         unidentifiable=np.setdiff1d(np.arange(len(names)), kept),
     )
-    return collect_all(wide, chosen, problem.recordings, problem.processing)
+    return problem.collected(wide, chosen)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,7 +192,7 @@ class _Bundle(Term):
 
     key: ClassVar[str] = "shape-slopes"
     stateful: ClassVar[bool] = True
-    slopes: tuple[ShapeSlope, ...]
+    slopes: tuple[Slope, ...]
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         return tuple(parameter for slope in self.slopes for parameter in slope.parameters(robot))
@@ -198,10 +223,10 @@ def _column_sizes(evidence: Evidence) -> FloatArray:
     return np.sqrt(squares)
 
 
-def _with_prior(evidence: Evidence, n_b: int, solution: Solution) -> Evidence:
+def _with_prior(evidence: Evidence, n_b: int, values: FloatArray) -> Evidence:
     """Return the evidence with what is known of shapes beforehand, in equal parts in every block of time."""
-    values = np.concatenate([solution.values, np.zeros(evidence.n_b - n_b)])
-    noise = np.maximum(joint_residuals(evidence, values), np.finfo(float).tiny)
+    unmoved = np.concatenate([values, np.zeros(evidence.n_b - n_b)])
+    noise = np.maximum(joint_residuals(evidence, unmoved), np.finfo(float).tiny)
     share = 1.0 / (PRIOR * np.sqrt(len(evidence.blocks)))
     extra = []
     for joint, support in enumerate(evidence.supports):

@@ -22,7 +22,7 @@ from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.terms import Bank, ShapedTerm, Term
 from tauhat.estimation.evidence import Evidence, collect_all
-from tauhat.estimation.solution import joint_residuals, joint_torques
+from tauhat.estimation.solution import joint_residuals, joint_torques, weighted_rows
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 
@@ -150,14 +150,8 @@ def _weighted_triangle(evidence: Evidence) -> FloatArray:
 
 def _scaled_rows(evidence: Evidence, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the weighted factors of all joints stacked, columns of unit norm and the torque last, and the norms."""
-    rows = []
-    for joint, factor in enumerate(evidence.total.factors):
-        row = np.zeros((factor.shape[0], evidence.n_b + 1))
-        row[:, evidence.supports[joint]] = weights[joint] * factor[:, :-1]
-        row[:, -1] = weights[joint] * factor[:, -1]
-        rows.append(row)
-    stacked = np.vstack(rows)
-    norms = np.linalg.norm(stacked[:, :-1], axis=0)
+    rows = weighted_rows(evidence, weights)
+    norms = np.linalg.norm(rows[:, :-1], axis=0)
     norms = np.where(norms > 0, norms, 1.0)
-    stacked[:, :-1] /= norms
-    return stacked, norms
+    rows[:, :-1] /= norms
+    return rows, norms

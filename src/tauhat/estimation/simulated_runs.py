@@ -17,9 +17,20 @@ from tauhat.dynamics.rigid_body import gravity_torque
 from tauhat.dynamics.simulated_arm import Followed, Gains, Moved, SimulatedArm, follow, simulated_arm
 from tauhat.errors import ModelError, SimulationError
 from tauhat.estimation.closed_loop import ClosedLoop
+from tauhat.estimation.prior import nominal_parameters
 from tauhat.estimation.problem import Problem
+from tauhat.estimation.rotor_load import standard_with_rotors
 from tauhat.estimation.rows import Rows, rows_of_stretches
-from tauhat.recordings.processing import CHUNK, Stretch, clock_step, stretches, uniform_clock
+from tauhat.recordings.processing import (
+    CHUNK,
+    Stretch,
+    bridged,
+    clock_step,
+    interpolated,
+    stretches,
+    uniform_clock,
+    unwrapped,
+)
 from tauhat.recordings.recording import Recording
 
 _LOST = 0.5  # distance between simulated and measured positions, in parts of the motion: no longer the same motion
@@ -29,8 +40,10 @@ _LOST = 0.5  # distance between simulated and measured positions, in parts of th
 class Run:
     """One recording on its uniform clock, and what the law followed; (n_v, n_t) each, references (n_t, n_v).
 
-    q, tau : measured, without any filter [rad or m], [Nm or N]
-    start : (2, n_v) position, through the filter of the processing, and reference of the speed at the first sample
+    q, tau : measured, without any filter [rad or m], [Nm or N]; the position at the times of the reference: those of
+        the log where the reference is given, later by the delay of the processing where it is the measured motion
+    start : (2, n_v) position, through the filter of the processing, and reference of the speed at the first sample; the
+        measured speed where the controller takes no reference of it
     q_ref, dq_ref, ddq_ref : the reference
     begin, end : first and last time of the rows that are trusted [s]
     """
@@ -79,10 +92,8 @@ class SimulatedRuns:
     layout: Layout
 
     def standard(self, values: FloatArray) -> FloatArray:
-        """Return standard parameters (n_p,) that move as the base parameters do: the regrouped ones are zero."""
-        standard = np.zeros(len(self.problem.base.names))
-        standard[self.problem.base.independent] = values
-        return standard
+        """Return standard parameters (n_p,) that move, and load the gears, as the base parameters and model do."""
+        return standard_with_rotors(self.problem.model, self.problem.base, values)
 
     def controller(self, run: Run, values: FloatArray) -> Controller:
         """Return law and reference of a run as numbers; what of them is not known is made from these parameters."""
@@ -90,7 +101,7 @@ class SimulatedRuns:
         masses = self.arm.masses(standard)
         law = self.loop.law_for(robot, masses, run.q_ref)
         known = masses if self.loop.law is None else nominal_masses(robot)
-        ahead = self._feedforward(run, law.feedforward, masses=known, standard=standard)
+        ahead = self._feedforward(run, law.feedforward, known)
         gains = Gains(law.kp, law.kd, law.integral_gain, law.torque_limit)
         return Controller(gains, Followed(run.q_ref, run.dq_ref, ahead))
 
@@ -112,13 +123,15 @@ class SimulatedRuns:
         stepping = self.loop.stepping(run.step)
         return follow(self.arm, self.standard(values), followed, gains=gains, start=run.start, stepping=stepping)
 
-    def _feedforward(self, run: Run, kind: Feedforward, *, masses: Masses, standard: FloatArray) -> FloatArray:
+    def _feedforward(self, run: Run, kind: Feedforward, masses: Masses) -> FloatArray:
+        """Return what the law adds ahead, (n_t, n_v): a whole model is that of the robot's description."""
         if kind == "nothing":
             return np.zeros_like(run.q_ref)
         if kind == "gravity":
             return gravity_torque(self.arm.model.robot, run.q_ref, inertia=masses.inertia)
         motion = motion_from_rows(run.q_ref, run.dq_ref, run.ddq_ref)
-        weights = standard[self.layout.parameters]
+        nominal = self.problem.base.projection @ nominal_parameters(self.problem.model)
+        weights = self.standard(nominal)[self.layout.parameters]
         columns, _ = self.arm.model.columns(replace(motion, step=run.step), self.layout)
         joints = [self.layout.of_joint(j) for j in range(self.arm.model.robot.n_v)]
         return np.ascontiguousarray(np.array([weights[rows] @ columns[rows] for rows in joints]).T)
@@ -200,13 +213,15 @@ def _run(problem: Problem, recording: Recording, loop: ClosedLoop, *, number: in
         q_ref, dq_ref, ddq_ref = (np.ascontiguousarray(signal.T) for signal in (smooth.q, smooth.dq, smooth.ddq))
     begin, end = window
     step = uniform_clock(recording, processing.delay).step
-    raw = _joined_stretches(list(stretches(recording, replace(processing, motion_cutoff=1.0 / step))))
+    # What delays the torque against the position does not delay the position against the reference.
+    late = 0.0 if loop.references else processing.delay
+    times, moved = bridged(recording.t, unwrapped(recording.q), step=step)
     return Run(
         name=recording.name,
         t=whole.t,
-        q=raw.q,
+        q=interpolated(times, moved, whole.t + late),
         tau=whole.tau,
-        start=np.array([whole.q[:, 0], dq_ref[0]]),
+        start=_start(whole, dq_ref, sooner=processing.delay - late),
         q_ref=q_ref,
         dq_ref=dq_ref,
         ddq_ref=ddq_ref,
@@ -214,6 +229,12 @@ def _run(problem: Problem, recording: Recording, loop: ClosedLoop, *, number: in
         begin=begin - 0.5 * clock_step(recording),
         end=end + 0.5 * clock_step(recording),
     )
+
+
+def _start(whole: Stretch, dq_ref: FloatArray, *, sooner: float) -> FloatArray:
+    """Return position and speed to begin with, (2, n_v): a motion's first sample, read that much sooner [s]."""
+    speed = dq_ref[0] if dq_ref.any() else whole.dq[:, 0]
+    return np.array([whole.q[:, 0] - sooner * whole.dq[:, 0], speed])
 
 
 def _joined_stretches(parts: list[Stretch]) -> Stretch:

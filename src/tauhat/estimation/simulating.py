@@ -48,13 +48,27 @@ class Tried(NamedTuple):
     motions: tuple[Moved, ...]
 
 
+class _Passed(NamedTuple):
+    """The end of a row of passes: the last values, what the last pass found, and why there was no other.
+
+    stopped : whether a pass led to values that move no robot
+    """
+
+    tried: Tried
+    last: Found
+    passes: int
+    cause: str
+    advice: str
+    stopped: bool
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationEstimator(Estimator):
     """A method that simulates the recorded robot with its controller, again and again.
 
     loop : law, gains and reference
     inner : least squares for the first values and, where the method has one, for the linear problem of every pass
-    tolerance : a pass that moves the predicted torque by less than this part of the residual is the last
+    tolerance : a pass that asks to move the predicted torque by less than this part of the residual is the last
     most_passes : after which the method stops in any case
     """
 
@@ -99,18 +113,42 @@ class SimulationEstimator(Estimator):
         check_rows(problem.evidence)
         runs = simulated_runs(problem, self.loop)
         tried = self._first(runs)
-        cause, advice, passes = "", "", 0
+        found = self._passed(runs, tried)
+        if found.stopped:
+            found = self._from_nominal(runs, tried) or found
+        return self.solution(runs, found.tried, found.last, (found.passes, found.cause, found.advice))
+
+    def _from_nominal(self, runs: SimulatedRuns, first: Tried) -> _Passed | None:
+        """Return the passes from the description's own values; None where these move no robot or end no better.
+
+        Least squares on badly filtered motion can be so far off that the passes lead to no robot at all.
+        """
+        try:
+            nominal = tried_in(runs, runs.problem.base.projection @ _nominal(runs.problem))
+        except (ModelError, SimulationError):
+            return None
+        if np.array_equal(nominal.values, first.values):
+            return None
+        found = self._passed(runs, nominal)
+        return None if found.stopped else found
+
+    def _passed(self, runs: SimulatedRuns, tried: Tried) -> _Passed:
+        """Return what as many passes as it takes make of these values."""
+        cause, advice, passes, stopped = "", "", 0, False
         while not cause:
             passes += 1
             found = self.improved(runs, tried)
-            before = tried.values
+            before = tried
             try:
-                tried = self._step(runs, tried, found)
+                tried = self._step(runs, before, found)
             except (ModelError, SimulationError) as error:
+                stopped = True
                 cause, advice = f"stopped in pass {passes}: {error.what} ({error.where})", _UNKNOWN_LOOP
             else:
-                cause, advice = self._reason(passes, torque_change(problem.evidence, tried.values - before, before))
-        return self.solution(runs, tried, found, (passes, cause, advice))
+                steps = (values - before.values for values in (found.values, tried.values))
+                asked, moved = (torque_change(runs.problem.evidence, step, before.values) for step in steps)
+                cause, advice = self._reason(passes, asked, moved)
+        return _Passed(tried, found, passes, cause=cause, advice=advice, stopped=stopped)
 
     @abstractmethod
     def improved(self, runs: SimulatedRuns, tried: Tried) -> Found:
@@ -151,10 +189,14 @@ class SimulationEstimator(Estimator):
                 return after
         return tried
 
-    def _reason(self, passes: int, moved: float) -> tuple[str, str]:
+    def _reason(self, passes: int, asked: float, moved: float) -> tuple[str, str]:
+        """Return cause and advice, empty while passes go on; a step that was only taken in part has not converged."""
         words = f"the last pass moved the torque by {100 * moved:.2g} % of the residual"
-        if moved < self.tolerance:
+        if asked < self.tolerance:
             return f"converged after {_counted(passes)}: {words}", ""
+        if moved == 0.0:
+            step = f"its step, {100 * asked:.2g} % of the residual in the torque"
+            return f"stopped in pass {passes}: no part of {step}, lowers the misfit", _UNKNOWN_LOOP
         if passes == self.most_passes:
             return f"stopped after {_counted(passes)}: {words}", _UNKNOWN_LOOP
         return "", ""

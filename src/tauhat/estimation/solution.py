@@ -134,6 +134,11 @@ def stacked(evidence: Evidence, block: Block, weights: FloatArray) -> tuple[Floa
     return np.vstack(parts), np.concatenate(rights)
 
 
+def weighted_rows(evidence: Evidence, weights: FloatArray) -> FloatArray:
+    """Return all joints' weighted factors as rows over all parameters, the torque last, (n, n_b + 1)."""
+    return np.column_stack(stacked(evidence, evidence.total, weights))
+
+
 def joint_residuals(evidence: Evidence, values: FloatArray) -> FloatArray:
     """Return the root mean square residual of each joint's equations, (n_v,) [Nm or N]."""
     total = evidence.total

@@ -30,6 +30,7 @@ from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 
 MOST_SAMPLES = 20_000  # settings are chosen on so many samples at most
+_FEWEST_ROWS = 1000  # of a recording in that sample
 _SWEEPS = 2  # over the terms that have a shape: what one takes depends on the others
 _STEPS = 3  # of Gauss and Newton, from the grid to the best shapes
 _LEAST_GAIN = 0.02  # a candidate must leave that much less residual to replace the default
@@ -55,19 +56,39 @@ def tuned(
         when the position is late against the torque and that is compensated.
     """
     sample = _shortened(recordings)
-    settings = processing or choose_processing(recordings, cutoff=cutoff)
+    if processing is not None:
+        return tuned_through(model, sample, processing), processing
+    return tuned_from(model, sample, choose_processing(recordings, cutoff=cutoff))
+
+
+def tuned_through(model: TorqueModel, sample: Sequence[Recording], processing: Processing) -> TorqueModel:
+    """Return the model with its shapes chosen on a sample of the recordings, through filters that are settled."""
+    model = first_loaded(_informed(model, sample), sample, processing, WeightedLeastSquares())
+    return _shaped(model, base_parameters(model), sample, processing)
+
+
+def tuned_from(model: TorqueModel, sample: Sequence[Recording], settings: Processing) -> tuple[TorqueModel, Processing]:
+    """Return the model with its shapes, and filters with their delay and source of velocity, chosen on a sample.
+
+    Parameters
+    ----------
+    settings : filters to begin with; their low-pass is kept
+
+    Warns
+    -----
+    TauhatWarning
+        when the position is late against the torque and that is compensated.
+    """
     model = first_loaded(_informed(model, sample), sample, settings, WeightedLeastSquares())
     base = base_parameters(model)
     shaped = _shaped(model, base, sample, settings)
-    if processing is not None:
-        return shaped, processing
     delay = position_delay(shaped, base, sample, settings)
     if delay.certain:
         settings = replace(settings, delay=delay.seconds)
         warnings.warn(
             f"{delay.words}: compensated",
             TauhatWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     settings = _best_processing(shaped, base, sample, settings)
     return _shaped(model, base, sample, settings), settings
@@ -82,12 +103,29 @@ def residual_level(
     return float(np.mean(np.log(np.maximum(residuals, np.finfo(float).tiny))))
 
 
+def sampled_rows(lengths: Sequence[int]) -> dict[int, int]:
+    """Return how many leading rows of which recordings settings are chosen on, in proportion, `MOST_SAMPLES` in all.
+
+    Of each a thousand rows are needed to show anything, so that of more than twenty long ones twenty stand for all.
+
+    Parameters
+    ----------
+    lengths : samples of each recording
+    """
+    if sum(lengths) <= MOST_SAMPLES:
+        return dict(enumerate(lengths))
+    places = np.linspace(0, len(lengths) - 1, min(len(lengths), MOST_SAMPLES // _FEWEST_ROWS)).round().astype(int)
+    taken = {int(place): lengths[place] for place in places}
+    share = min(1.0, MOST_SAMPLES / sum(taken.values()))
+    return {place: min(length, max(_FEWEST_ROWS, int(share * length))) for place, length in taken.items()}
+
+
 def _shortened(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-    """Return the leading part of each recording, in proportion, `MOST_SAMPLES` in all."""
-    share = min(1.0, MOST_SAMPLES / sum(recording.n_t for recording in recordings))
+    """Return the sample of the recordings that settings are chosen on."""
+    rows = sampled_rows([recording.n_t for recording in recordings])
     return tuple(
-        recording if share == 1.0 else recording.rows(0, max(1000, int(share * recording.n_t)))
-        for recording in recordings
+        recordings[place] if count == recordings[place].n_t else recordings[place].rows(0, count)
+        for place, count in rows.items()
     )
 
 

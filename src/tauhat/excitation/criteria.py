@@ -137,6 +137,7 @@ class Mixed(Criterion):
 CRITERIA: dict[str, type[Criterion]] = {
     kind.key: kind for kind in (Mixed, ConditionNumber, DOptimal, AOptimal, EOptimal)
 }
+"""Every criterion by its name."""
 
 
 def criterion_named(key: str) -> Criterion:

@@ -38,7 +38,9 @@ from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot
 
 Method: TypeAlias = Literal["genetic", "gradient", "both"]
+"""How a motion is searched for."""
 METHODS: tuple[Method, ...] = ("genetic", "gradient", "both")
+"""All of these."""
 
 _REPORT_SAMPLES = FINER * SAMPLES
 

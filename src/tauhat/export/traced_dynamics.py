@@ -57,7 +57,7 @@ def traced_joints(trace: Trace, robot: Robot, inertia: FloatArray) -> tuple[Trac
     joints = []
     for index, joint in enumerate(robot.joints):
         q = trace.variable(f"q[{index}]")
-        constant, cosine, sine = (_snapped(part).reshape(3, 3) for part in tree.abc[index])
+        constant, cosine, sine = (_snapped(part).reshape(3, 3) for part in tree.links["abc"][index])
         rotation, place = _matrix(trace, constant), _vector(trace, joint.translation)
         axis = _vector(trace, _snapped(joint.axis))
         if joint.kind == "revolute":

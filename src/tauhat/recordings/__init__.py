@@ -4,6 +4,7 @@ from tauhat.recordings.checks import check_limits, check_log
 from tauhat.recordings.choice import choose_cutoff, choose_processing
 from tauhat.recordings.findings import Finding, worst
 from tauhat.recordings.log import Log
+from tauhat.recordings.log_source import LogSource
 from tauhat.recordings.logmap import Coupling, LogMap, RowWindow, SignalMap, TimeMap, parse_rows
 from tauhat.recordings.mapfile import find_map, load_map, parse_map
 from tauhat.recordings.periods import PeriodAverage, average_periods
@@ -18,6 +19,7 @@ __all__ = [
     "Finding",
     "Log",
     "LogMap",
+    "LogSource",
     "PeriodAverage",
     "Processing",
     "Recording",

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -119,6 +120,7 @@ def differentiators(cutoff: float, rate: float) -> tuple[FirFilter, FirFilter, F
     return tuple(FirFilter(kernel=read_only(kernel)) for kernel in (smooth, first, second))  # type: ignore[return-value]
 
 
+@lru_cache(maxsize=16)
 def _impulse_response(cutoff: float, rate: float, derivative: int, tail: float) -> FloatArray:
     """Return the symmetric (or antisymmetric) kernel of `|H|^2 (2 pi i f)^derivative`, cut where it has died out."""
     from scipy.signal import butter, sosfreqz
@@ -140,7 +142,7 @@ def _impulse_response(cutoff: float, rate: float, derivative: int, tail: float) 
     if derivative % 2:
         spectrum[-1] = 0.0
     impulse = np.fft.irfft(spectrum, size)
-    return np.roll(impulse, half)[: 2 * half + 1]
+    return read_only(np.roll(impulse, half)[: 2 * half + 1])
 
 
 def with_context(chunks: Iterable[FloatArray], half: int, *, multiple: int = 1) -> Iterator[FloatArray]:

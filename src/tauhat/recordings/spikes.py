@@ -37,7 +37,9 @@ def without_spikes(recording: Recording, *, threshold: float) -> Mended:
         return Mended(recording, 0.0)
     from scipy.ndimage import median_filter
 
-    middle = median_filter(recording.tau, size=(WINDOW, 1), mode="nearest")
+    # Joint by joint: SciPy's filter of one axis takes a fifth of the time of its filter of two.
+    columns = [median_filter(np.ascontiguousarray(tau), size=WINDOW, mode="nearest") for tau in recording.tau.T]
+    middle = np.column_stack(columns)
     distance = np.abs(recording.tau - middle)
     spikes = distance > threshold * _usual(distance)
     if not spikes.any():

@@ -1,6 +1,7 @@
 """The HTML report and its figures."""
 
 from tauhat.report.page import write_motion_report, write_report
+from tauhat.report.study_page import write_study
 from tauhat.report.thinning import thinned, thinned_cloud
 
-__all__ = ["thinned", "thinned_cloud", "write_motion_report", "write_report"]
+__all__ = ["thinned", "thinned_cloud", "write_motion_report", "write_report", "write_study"]

@@ -26,7 +26,7 @@ _FLOAT32_SECONDS = 1e3  # below this a float32 tells times apart to 0.06 ms
 _WIDTH_PER_NAME = 15  # [px]
 _LEGEND_AND_BUTTONS = 56  # [px] above a drawing
 _SHOWN_RELATIVE = 2.0  # error bars longer than this part of the value are cut off at the drawing's edge
-_LINE_COLOURS = ("#3b7dd8", "#e07b28", "#2f9e62", "#b0447f", "#8a6bd1", "#c9a227", "#4fb3bf", "#8c8c8c")
+LINE_COLOURS = ("#3b7dd8", "#e07b28", "#2f9e62", "#b0447f", "#8a6bd1", "#c9a227", "#4fb3bf", "#8c8c8c")
 
 
 def torque_plot(log: LogPrediction, joint: int, *, key: str, most: int = MOST_POINTS) -> Plot:
@@ -87,7 +87,7 @@ def time_plot(log: LogPrediction, *, key: str) -> Plot:
         figure.add_trace(
             go.Scatter(
                 x=compact(np.array([part.mean() for part, _ in pairs])), y=compact(100 * share), mode="lines+markers",
-                name=plain(facts.name), line={"color": _LINE_COLOURS[joint % len(_LINE_COLOURS)], "width": 2},
+                name=plain(facts.name), line={"color": LINE_COLOURS[joint % len(LINE_COLOURS)], "width": 2},
                 hovertemplate="%{y:.3g} %",
             )
         )  # fmt: skip

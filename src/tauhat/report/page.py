@@ -52,7 +52,7 @@ def write_report(
     OutputError
         when the file cannot be written.
     """
-    _require_libraries()
+    require_libraries()
     from tauhat.report.case import Case
     from tauhat.report.motion_case import motion_case
     from tauhat.report.sections import MOTION_SECTIONS, SECTIONS
@@ -63,7 +63,7 @@ def write_report(
         moved = motion_case(estimate.robot, motion, counted=information(with_exact_sign(estimate.model)))
         sections += [section(moved) for section in MOTION_SECTIONS]
     heading = title or f"{estimate.robot.name}: identified torque model"
-    write_text(path, _page(sections, title=heading, version=estimate.version))
+    write_text(path, page_of(sections, title=heading, version=estimate.version))
     return Path(path)
 
 
@@ -91,14 +91,14 @@ def write_motion_report(
     OutputError
         when the file cannot be written.
     """
-    _require_libraries()
+    require_libraries()
     from tauhat import __version__
     from tauhat.report.motion_case import motion_case
     from tauhat.report.sections import MOTION_SECTIONS
 
     case = motion_case(robot, trajectory, counted=counted, limits=limits, margins=margins)
     sections = [section(case) for section in MOTION_SECTIONS]
-    write_text(path, _page(sections, title=f"{robot.name}: designed motion", version=__version__))
+    write_text(path, page_of(sections, title=f"{robot.name}: designed motion", version=__version__))
     return Path(path)
 
 
@@ -112,11 +112,11 @@ def write_comparison(path: str | Path, comparison: Comparison, *, title: str) ->
     OutputError
         when the file cannot be written.
     """
-    _require_libraries()
+    require_libraries()
     from tauhat import __version__
     from tauhat.report.sections.comparison import comparison as section
 
-    write_text(path, _page([section(comparison)], title=title, version=__version__))
+    write_text(path, page_of([section(comparison)], title=title, version=__version__))
     return Path(path)
 
 
@@ -128,7 +128,8 @@ def _by_log(findings: Findings | None) -> tuple[tuple[str, tuple[Finding, ...]],
     return (("", tuple(findings)),)
 
 
-def _require_libraries() -> None:
+def require_libraries() -> None:
+    """Refuse to go on without what pages are made with."""
     for library in ("plotly", "jinja2"):
         try:
             importlib.import_module(library)
@@ -136,7 +137,8 @@ def _require_libraries() -> None:
             raise MissingExtraError(library, "report") from error
 
 
-def _page(sections: Sequence[Section], *, title: str, version: str) -> str:
+def page_of(sections: Sequence[Section], *, title: str, version: str) -> str:
+    """Return the whole page: sections, their drawings' data, styles and scripts."""
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
 

@@ -11,6 +11,7 @@ from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import RobotError
 
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
+"""How a joint moves."""
 
 _ORTHOGONALITY = 1e-6  # how far R^T R may be from the identity before a placement is refused
 _LARGEST_LENGTH = 1e3  # [m] a link longer than this is a unit error

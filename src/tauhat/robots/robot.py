@@ -16,6 +16,7 @@ from tauhat.robots.joint import Joint, Limits
 from tauhat.robots.solid import Solid
 
 EARTH = (0.0, 0.0, -9.81)
+"""Acceleration of free fall in the base frame of an arm that stands upright [m/s^2]."""
 _MOST_JOINTS = 100
 
 

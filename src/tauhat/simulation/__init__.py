@@ -1,9 +1,13 @@
 """Simulated experiments: a MuJoCo plant, sensor errors, and recordings that know their truth."""
 
+from tauhat.simulation.attached import AttachedBody
+from tauhat.simulation.closed_loop import Encoder, Environment
+from tauhat.simulation.elasticity import ElasticJoints
 from tauhat.simulation.experiment import ExperimentSettings, Simulation, Truth, simulate
 from tauhat.simulation.gains import tracking_gains
+from tauhat.simulation.heat import FrictionHeat
 from tauhat.simulation.parameters import TrueParameters, nominal_parameters, perturbed
-from tauhat.simulation.plant import Plant, build_plant, plant_gravity_torque
+from tauhat.simulation.plant import Plant, build_plant, plant_gravity_torque, plant_torque
 from tauhat.simulation.running import Reaction, RunningPlant, started
 from tauhat.simulation.sensors import Measured, SensorErrors, measure
 from tauhat.simulation.truth_file import load_true_parameters
@@ -11,7 +15,12 @@ from tauhat.simulation.typical import KINDS, matching_model, typical_plant, with
 
 __all__ = [
     "KINDS",
+    "AttachedBody",
+    "ElasticJoints",
+    "Encoder",
+    "Environment",
     "ExperimentSettings",
+    "FrictionHeat",
     "Measured",
     "Plant",
     "Reaction",
@@ -27,6 +36,7 @@ __all__ = [
     "nominal_parameters",
     "perturbed",
     "plant_gravity_torque",
+    "plant_torque",
     "simulate",
     "started",
     "tracking_gains",

@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from tauhat.arrays import FloatArray, read_only
-from tauhat.control.laws import PDGravity
+from tauhat.control.controller import Controller
+from tauhat.control.laws import TrackingLaw
 from tauhat.errors import SimulationError, TauhatWarning
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
 from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot
 from tauhat.robots.shared_motor import SharedMotor
+from tauhat.simulation.closed_loop import Course, Encoder, Environment, Pilot, follow
 from tauhat.simulation.gains import tracking_gains
 from tauhat.simulation.laws import SharedDrive
 from tauhat.simulation.parameters import TrueParameters
-from tauhat.simulation.plant import Plant, build_plant, load_mujoco, plant_gravity_torque
-from tauhat.simulation.running import RunningPlant, started
+from tauhat.simulation.plant import build_plant
+from tauhat.simulation.running import CHANNELS, started
 from tauhat.simulation.sensors import SensorErrors, measure
 
-_RUNAWAY = 1e3  # [rad/s or m/s] no robot moves this fast: the simulation has diverged
-_LOGGED = ("q", "dq", "ddq", "tau", "coulomb_torque", "law_torque")
 _WHOLE = 1e-6  # how far a ratio of rates may be from a whole number
 
 
@@ -38,7 +35,9 @@ class ExperimentSettings:
     sample_rate : of the log [Hz]; its period is a whole number of control periods
     settle : time the robot holds the start pose before the log begins [s]
     bandwidth : of the controller that is tuned when none is given [Hz]
-    controller : gains and torque limits; tuned on the nominal robot by default
+    controller : a tracking law, or any other controller; tuned on the nominal robot by default
+    control_delay : from the encoders to the torque that answers them, whole control periods [s]
+    encoder : on which side of elastic joints it sits, and what the controller sees of it
     sensors : what the log shows of the truth
     """
 
@@ -47,7 +46,9 @@ class ExperimentSettings:
     sample_rate: float = 1000.0
     settle: float = 1.0
     bandwidth: float = 15.0
-    controller: PDGravity | None = None
+    controller: TrackingLaw | Controller | None = None
+    control_delay: float = 0.0
+    encoder: Encoder = field(default_factory=Encoder)
     sensors: SensorErrors = field(default_factory=SensorErrors)
 
     def __post_init__(self) -> None:
@@ -55,10 +56,13 @@ class ExperimentSettings:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise SimulationError(f"setting {name}", expected="a positive number", got=value)
-        if not (np.isfinite(self.settle) and self.settle >= 0.0):
-            raise SimulationError("setting settle", expected="a time >= 0", got=self.settle)
+        for name in ("settle", "control_delay"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise SimulationError(f"setting {name}", expected="a time >= 0", got=getattr(self, name))
         _whole("timesteps in a control period", 1.0 / (self.control_rate * self.timestep))
         _whole("control periods in a sample period", self.control_rate / self.sample_rate)
+        if self.control_delay > 0.0:
+            _whole("control periods in the delay", self.control_delay * self.control_rate)
 
     @property
     def substeps(self) -> int:
@@ -70,19 +74,36 @@ class ExperimentSettings:
         """Control periods in a sample period."""
         return round(self.control_rate / self.sample_rate)
 
+    @property
+    def delayed(self) -> int:
+        """Control periods of delay."""
+        return round(self.control_delay * self.control_rate)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Truth:
     """What the sensors cannot show, at the samples of the recording; (n_t, n_v) arrays.
 
-    At every sample `tau = inverse dynamics(q, dq, ddq) + rotor ddq + viscous dq + coulomb_torque + law_torque + offset`
-    exactly: ddq is the acceleration at the state (q, dq) under the motor torque tau.
+    At every sample, to rounding,
+
+        tau = inverse dynamics(q, dq, ddq) + rotor motor_ddq + viscous motor_dq + coulomb_torque + law_torque + offset
+              - external_torque
+
+    ddq and motor_ddq are the accelerations at that state under the motor torque tau. Where joints are rigid, the motor
+    moves as the joint does. Where they are elastic, the equation is the sum of the motor's and the link's, which meet
+    in `gear_torque = stiffness d + damping dd`, d = motor_q - q (less the gap): links and springs take gear_torque +
+    external_torque, all the rest is the motor's.
 
     parameters : of the plant; an offset of the torque sensor is not among them
-    q, dq, ddq : [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
-    tau : motor torque [Nm or N]
-    coulomb_torque : the part of tau that dry friction takes, `coulomb sign(dq)` while the joint moves [Nm or N]
-    law_torque : the part that the plant's passive laws and shared motors take [Nm or N]
+    q, dq, ddq : of the links [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
+    tau : motor torque, after the control's delay [Nm or N]
+    coulomb_torque : the part of tau that dry friction takes, `coulomb sign(motor_dq)` while the joint moves, at its
+        temperature [Nm or N]
+    law_torque : the part that passive laws, shared motors and the heat's change of viscous friction take [Nm or N]
+    motor_q, motor_dq, motor_ddq : of the motors, on the joint side
+    gear_torque : what the gear passes on to the link, as a torque sensor behind it shows [Nm or N]
+    temperature : of the joints [deg C]; zero where the plant has no heat
+    external_torque : what the environment adds [Nm or N]
     reference : the motion that was asked for
     """
 
@@ -93,6 +114,12 @@ class Truth:
     tau: FloatArray
     coulomb_torque: FloatArray
     law_torque: FloatArray
+    motor_q: FloatArray
+    motor_dq: FloatArray
+    motor_ddq: FloatArray
+    gear_torque: FloatArray
+    temperature: FloatArray
+    external_torque: FloatArray
     reference: MotionSamples
 
 
@@ -111,53 +138,77 @@ def simulate(
     rng: np.random.Generator,
     parameters: TrueParameters | None = None,
     settings: ExperimentSettings | None = None,
+    environment: Environment | None = None,
 ) -> Simulation:
     """Return what a log of the robot following the motion would hold, and the truth behind it.
 
-    A PD controller with the nominal robot's gravity at the reference as feedforward acts on the true state. Recording
-    and truth share one clock that starts with the motion: sample k is the state at t_k and the torque the motor starts
-    to deliver at t_k.
+    By default a PD controller with the nominal robot's gravity at the reference as feedforward acts on the true state.
+    Recording and truth share one clock that starts with the motion: sample k is the state at t_k and the torque the
+    motor starts to deliver at t_k. The recording's position is that of the encoder: with `encoder.side = "motor"` and
+    elastic joints, the motor's.
 
     Parameters
     ----------
     motion : of the same number of joints; run once, from t = 0 to its duration
     rng : of the sensor noise
     parameters : true inertia and friction; nominal by default
+    environment : pushes on the links; nothing by default
 
     Raises
     ------
     SimulationError
         when a link is not physical, the motion does not fit the robot, or the robot goes unstable.
-    MissingExtraError
-        when MuJoCo is not installed.
     """
-    settings = ExperimentSettings() if settings is None else settings
+    settings = settings or ExperimentSettings()
     if motion.n_v != robot.n_v:
         raise SimulationError("the motion is of another robot", where=robot.name, expected=robot.n_v, got=motion.n_v)
     plant = build_plant(robot, parameters=parameters, timestep=settings.timestep)
-    reference = motion.sample(_control_clock(motion, settings))
-    nominal = build_plant(robot, timestep=settings.timestep)
-    feedforward = plant_gravity_torque(nominal, reference.q)
-    law = settings.controller or tracking_gains(
-        robot, reference.q, bandwidth=settings.bandwidth, control_rate=settings.control_rate
-    )
-    log = _run(plant, law, reference, feedforward=feedforward, settings=settings)
-    _warn_of_saturation(robot, law, log["tau"])
-    shown = measure(settings.sensors, log["q"], log["dq"], tau=log["tau"], rng=rng)
-    t = np.arange(len(log["q"])) / settings.sample_rate
+    course = _course(robot, motion, settings)
+    pilot = _pilot(robot, course, settings)
+    running = started(plant, course.reference.q[0])
+    rows = follow(running, pilot, course, environment=environment)
+    log = {name: np.ascontiguousarray(rows[:, index]) for index, name in enumerate(CHANNELS)}
+    _warn_of_saturation(robot, pilot.controller.torque_limit, log["tau"])
+    t = np.arange(len(rows)) / settings.sample_rate
     truth = Truth(
         parameters=plant.parameters, reference=motion.sample(t), **{name: read_only(log[name]) for name in log}
     )
-    recording = Recording(
-        t=t,
+    return Simulation(recording=_recording(robot, truth, settings, rng), truth=truth)
+
+
+def _course(robot: Robot, motion: Trajectory, settings: ExperimentSettings) -> Course:
+    """Return the reference at every control step, with the nominal robot's torque along it."""
+    return Course(
+        reference=motion.sample(_control_clock(motion, settings)),
+        nominal=build_plant(robot, timestep=settings.timestep),
+        settle=round(settings.settle * settings.control_rate),
+        stride=settings.stride,
+        period=1.0 / settings.control_rate,
+        substeps=settings.substeps,
+    )
+
+
+def _pilot(robot: Robot, course: Course, settings: ExperimentSettings) -> Pilot:
+    law = settings.controller or tracking_gains(
+        robot, course.reference.q, bandwidth=settings.bandwidth, control_rate=settings.control_rate
+    )
+    return Pilot(controller=law, encoder=settings.encoder, delayed=settings.delayed)
+
+
+def _recording(robot: Robot, truth: Truth, settings: ExperimentSettings, rng: np.random.Generator) -> Recording:
+    """Return the truth as the sensors show it."""
+    side = (truth.motor_q, truth.motor_dq) if settings.encoder.side == "motor" else (truth.q, truth.dq)
+    shown = measure(settings.sensors, *side, tau=truth.tau, rng=rng)
+    return Recording(
+        t=truth.reference.t,
         q=shown.q,
         dq=shown.dq,
         tau=shown.tau,
+        temperature=None if truth.parameters.heat is None else truth.temperature,
         joint_names=robot.joint_names,
         name=f"{robot.name} simulated",
-        shared_motors=_shared_motors(plant.parameters),
+        shared_motors=_shared_motors(truth.parameters),
     )
-    return Simulation(recording=recording, truth=truth)
 
 
 def _shared_motors(parameters: TrueParameters) -> tuple[SharedMotor, ...]:
@@ -171,69 +222,8 @@ def _control_clock(motion: Trajectory, settings: ExperimentSettings) -> FloatArr
     return np.arange(samples * settings.stride + 1) / settings.control_rate
 
 
-def _run(
-    plant: Plant, law: PDGravity, reference: MotionSamples, *, feedforward: FloatArray, settings: ExperimentSettings
-) -> dict[str, FloatArray]:
-    """Return the truth at the samples of the log, after the robot has settled in the start pose."""
-    mujoco = load_mujoco()
-    running = started(plant, reference.q[0])
-    stepper = _Stepper(running=running, law=law, substeps=settings.substeps)
-    log = np.empty(((reference.n_t - 1) // settings.stride + 1, len(_LOGGED), plant.robot.n_v))
-    hold = np.zeros(plant.robot.n_v)
-    with _silent(mujoco):
-        for step in range(round(settings.settle * settings.control_rate)):
-            stepper.advance(reference.q[0], hold, feedforward[0], step / settings.control_rate - settings.settle)
-        for step, t in enumerate(reference.t.tolist()):
-            state = stepper.advance(reference.q[step], reference.dq[step], feedforward[step], t)
-            if step % settings.stride == 0:
-                log[step // settings.stride] = state
-    return {name: np.ascontiguousarray(log[:, index]) for index, name in enumerate(_LOGGED)}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Stepper:
-    """One control period of a plant under a control law."""
-
-    running: RunningPlant
-    law: PDGravity
-    substeps: int
-
-    def advance(
-        self, q_ref: FloatArray, dq_ref: FloatArray, gravity_torque: FloatArray, t: float
-    ) -> tuple[FloatArray, ...]:
-        """Return the log's channels at the begin of the period, and pass it."""
-        q, dq = self.running.state
-        if not dq @ dq < _RUNAWAY**2:
-            self._report_runaway(dq, t)
-        tau = self.law.torque(q, dq, q_ref=q_ref, dq_ref=dq_ref, gravity_torque=gravity_torque)
-        ddq, coulomb_torque, law_torque = self.running.advance(tau, self.substeps)
-        return q, dq, ddq, tau, coulomb_torque, law_torque
-
-    def _report_runaway(self, dq: FloatArray, t: float) -> None:
-        worst = int(np.argmax(np.where(np.isfinite(dq), np.abs(dq), np.inf)))
-        robot = self.running.plant.robot
-        joint = robot.joints[worst]
-        raise SimulationError(
-            "the simulated robot went unstable",
-            where=f"{robot.name}, joint {joint.name}",
-            got=f"{dq[worst]:.3g} {joint.unit}/s at t = {t:.4g} s",
-            remedy="lower the controller's gains, raise the control rate or shorten the timestep",
-        )
-
-
-@contextmanager
-def _silent(mujoco: Any) -> Iterator[None]:
-    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working directory; divergence is reported as an error."""
-    previous = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(previous)
-
-
-def _warn_of_saturation(robot: Robot, law: PDGravity, tau: FloatArray) -> None:
-    saturated = np.abs(tau) >= law.torque_limit
+def _warn_of_saturation(robot: Robot, limit: FloatArray, tau: FloatArray) -> None:
+    saturated = np.abs(tau) >= limit
     if saturated.any():
         worst = int(saturated.mean(axis=0).argmax())
         share = 100.0 * saturated[:, worst].mean()

@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from tauhat.arrays import FloatArray, frozen
+from tauhat.arrays import FloatArray, frozen, read_only
 from tauhat.errors import SimulationError
 from tauhat.robots.inertia_checks import inertia_defect
 from tauhat.robots.joint import central_inertia, inertia_at_origin
 from tauhat.robots.robot import Robot
 from tauhat.robots.transforms import rotation_about
-from tauhat.simulation.laws import LAWS, PassiveLaw, law_from_dict
+from tauhat.simulation.attached import AttachedBody
+from tauhat.simulation.elasticity import ElasticJoints
+from tauhat.simulation.heat import FrictionHeat
+from tauhat.simulation.laws import LAWS, PassiveLaw, SharedDrive, law_from_dict
 
 SYMBOLS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 DRIVES: Mapping[str, str] = {"Ia": "rotor", "Fv": "viscous", "Fc": "coulomb", "To": "offset"}
@@ -26,10 +29,15 @@ _THINNEST = 1e-6  # smallest spread of a perturbed body along a principal axis, 
 class TrueParameters:
     """What the plant is made of: `tau = rigid(q, dq, ddq) + rotor ddq + viscous dq + coulomb sign(dq) + offset + laws`.
 
+    Rotor and friction are those of the motor: where the transmission is elastic, their dq and ddq are the motor's.
+
     inertia : (n_v, 10) `m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz` about the joint frames [kg, kg m, kg m^2]
     rotor : (n_v,) rotor inertia on the joint side [kg m^2 or kg]
     viscous, coulomb, offset : (n_v,) [Nm s/rad, Nm, Nm] or [N s/m, N, N]
     laws : friction of other kinds, springs and shared motors, added to these
+    elasticity : of the joints that are not rigid
+    heat : what heats the joints, and how friction depends on it
+    attached : tools and payloads, whose inertia adds to that of their links
     """
 
     inertia: FloatArray
@@ -38,6 +46,9 @@ class TrueParameters:
     coulomb: FloatArray
     offset: FloatArray
     laws: tuple[PassiveLaw, ...] = ()
+    elasticity: ElasticJoints | None = None
+    heat: FrictionHeat | None = None
+    attached: tuple[AttachedBody, ...] = ()
 
     def __post_init__(self) -> None:
         inertia = frozen("inertia", self.inertia, (None, 10), where="true parameters")
@@ -49,16 +60,44 @@ class TrueParameters:
                 joint = int(np.argmin(values)) + 1
                 raise SimulationError(f"{name} is negative", where=f"true parameters, joint {joint}", got=values.min())
         object.__setattr__(self, "laws", tuple(self.laws))
+        object.__setattr__(self, "attached", tuple(self.attached))
         for law in self.laws:
             law.check(self.n_v)
+        for body in self.attached:
+            body.check(self.n_v)
+        if self.heat is not None:
+            self.heat.check(self.laws, self.n_v)
+        if self.elasticity is not None:
+            self._check_elasticity(self.elasticity)
+
+    def _check_elasticity(self, elasticity: ElasticJoints) -> None:
+        elasticity.check(self.n_v)
+        without = [joint + 1 for joint in elasticity.joints if self.rotor[joint] <= 0.0]
+        if without:
+            remedy = "give the joint a rotor inertia"
+            raise SimulationError("an elastic joint needs a rotor", where=f"joint {without[0]}", got=0.0, remedy=remedy)
+        for law in self.laws:
+            if isinstance(law, SharedDrive) and {law.own, law.other} & set(elasticity.joints):
+                got = f"joints {law.own} and {law.other}"
+                raise SimulationError("a shared motor needs rigid joints", where=f"law {law.key}", got=got)
 
     @property
     def n_v(self) -> int:
         """Number of joints."""
         return int(self.inertia.shape[0])
 
+    @property
+    def carried_inertia(self) -> FloatArray:
+        """Inertia of the links with what is attached to them, (n_v, 10)."""
+        inertia = self.inertia.copy()
+        for body in self.attached:
+            inertia[body.joint] += body.parameters
+        return np.asarray(read_only(inertia))
+
     def value(self, symbol: str, joint: int) -> float:
         """Return the true value of a standard parameter; zero where the plant has nothing of the kind.
+
+        Links are with what is attached to them, friction is that of the reference temperature.
 
         Raises
         ------
@@ -68,18 +107,23 @@ class TrueParameters:
         if symbol not in {*SYMBOLS, *DRIVES, *_OF_LAWS}:
             raise SimulationError("the simulation has no such parameter", got=symbol)
         if symbol in SYMBOLS:
-            return float(self.inertia[joint, SYMBOLS.index(symbol)])
+            return float(self.carried_inertia[joint, SYMBOLS.index(symbol)])
         own = float(getattr(self, DRIVES[symbol])[joint]) if symbol in DRIVES else 0.0
         return own + sum(law.true_values().get((symbol, joint), 0.0) for law in self.laws)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data that `from_dict` reads back exactly."""
         arrays = {name: getattr(self, name).tolist() for name in ("inertia", *DRIVES.values())}
-        return arrays | {"laws": [law.to_dict() for law in self.laws]}
+        return arrays | {
+            "laws": [law.to_dict() for law in self.laws],
+            "elasticity": None if self.elasticity is None else self.elasticity.to_dict(),
+            "heat": None if self.heat is None else self.heat.to_dict(),
+            "attached": [body.to_dict() for body in self.attached],
+        }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> TrueParameters:
-        """Return the parameters that `to_dict` described.
+        """Return the parameters that `to_dict` described, in this version or before elasticity, heat and tools.
 
         Raises
         ------
@@ -89,9 +133,15 @@ class TrueParameters:
         try:
             arrays = {name: data[name] for name in ("inertia", *DRIVES.values())}
             laws = tuple(law_from_dict(law) for law in data["laws"])
+            elasticity, heat = data.get("elasticity"), data.get("heat")
+            parts: dict[str, Any] = {
+                "elasticity": None if elasticity is None else ElasticJoints.from_dict(elasticity),
+                "heat": None if heat is None else FrictionHeat.from_dict(heat),
+                "attached": tuple(AttachedBody.from_dict(body) for body in data.get("attached", ())),
+            }
         except (KeyError, TypeError, AttributeError) as error:
             raise SimulationError("true parameters are damaged", got=f"{type(error).__name__}: {error}") from error
-        return cls(**arrays, laws=laws)
+        return cls(**arrays, laws=laws, **parts)
 
 
 def nominal_parameters(robot: Robot) -> TrueParameters:

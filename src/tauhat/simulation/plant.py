@@ -111,6 +111,26 @@ def plant_gravity_torque(plant: Plant, q: FloatArray) -> FloatArray:
     return torque
 
 
+def plant_torque(plant: Plant, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+    """Return the torque of the plant's links and rotors along a motion without friction, (n_t, n_v), from MuJoCo.
+
+    Parameters
+    ----------
+    q, dq, ddq : (n_t, n_v)
+    """
+    mujoco = load_mujoco()
+    motion = [frozen(name, x, (None, plant.robot.n_v)) for name, x in (("q", q), ("dq", dq), ("ddq", ddq))]
+    data, dof = mujoco.MjData(plant.model), plant.dof
+    torque, moved = np.empty(motion[0].shape), np.empty(plant.model.nv)
+    for row, (position, speed, acceleration) in enumerate(zip(*motion, strict=True)):
+        data.qpos[dof], data.qvel[dof], data.qacc[dof] = position, speed, acceleration
+        mujoco.mj_fwdPosition(plant.model, data)
+        mujoco.mj_fwdVelocity(plant.model, data)
+        mujoco.mj_mulM(plant.model, data, moved, data.qacc)
+        torque[row] = (moved + data.qfrc_bias)[dof]
+    return torque
+
+
 def _specification(mujoco: Any, robot: Robot, parameters: TrueParameters, timestep: float) -> Any:
     specification = mujoco.MjSpec()
     option, disable = specification.option, mujoco.mjtDisableBit
@@ -121,13 +141,14 @@ def _specification(mujoco: Any, robot: Robot, parameters: TrueParameters, timest
     # Without auto-reset a diverging state stays visible instead of silently starting again from zero.
     option.disableflags |= int(disable.mjDSBL_CONTACT) | int(disable.mjDSBL_AUTORESET)
     bodies: list[Any] = []
+    inertia = parameters.carried_inertia
     for index, joint in enumerate(robot.joints):
         parent = specification.worldbody if joint.parent < 0 else bodies[joint.parent]
         body = parent.add_body(
             name=f"link_{index + 1}", pos=joint.translation, quat=_quaternion(mujoco, joint.rotation)
         )
         _add_joint(mujoco, body, joint, index)
-        _set_inertia(mujoco, body, parameters.inertia[index], joint.name)
+        _set_inertia(mujoco, body, inertia[index], joint.name)
         bodies.append(body)
     for law in parameters.laws:
         if isinstance(law, SharedDrive):
@@ -165,7 +186,10 @@ def _compiled(mujoco: Any, specification: Any, robot: Robot) -> Any:
 
 
 def _set_drives(mujoco: Any, model: Any, dof: IntArray, parameters: TrueParameters) -> None:
-    model.dof_armature[dof] = parameters.rotor
+    elastic = [] if parameters.elasticity is None else list(parameters.elasticity.joints)
+    rotor = parameters.rotor.copy()
+    rotor[elastic] = 0.0  # an elastic joint's rotor turns outside MuJoCo, at the other end of its spring
+    model.dof_armature[dof] = rotor
     model.dof_damping[dof] = parameters.viscous
     model.dof_frictionloss[dof] = parameters.coulomb
     model.dof_solref[:] = (FRICTION_TIME_STEPS * model.opt.timestep, 1.0)

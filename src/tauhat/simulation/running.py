@@ -1,149 +1,211 @@
 """The plant in motion: its state, the memory of its passive laws, and one step of time.
 
-Every step the laws see the state at its begin. Their torque is applied; its derivative by dq goes to MuJoCo as damping,
-with the same torque `damping dq` added back, so that the acceleration is that of the laws exactly, while the integrator
-treats the steep part of friction near zero speed implicitly (a Rosenbrock step). Bristles are stepped like any spring:
-position after velocity, which keeps energy and is stable for `step sqrt(stiffness / inertia) < 2`.
+A step is that of `step_kernel`, which calls MuJoCo by the address of its functions; where those are not to be had, the
+same step is passed by `reference_step` in Python.
 """
 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.errors import SimulationError
-from tauhat.simulation.laws import JointState, SharedDrive
 from tauhat.simulation.laws.law import resting_state
+from tauhat.simulation.laws.program import parts_of_memory
+from tauhat.simulation.loop_kernel import pass_period
+from tauhat.simulation.machine import Machine, MachineState, engine_of, machine_of, machine_state
+from tauhat.simulation.native import native_functions
 from tauhat.simulation.plant import Plant, load_mujoco
+from tauhat.simulation.reference_step import Laws, Simulator, reference_step
 
 _LONGEST_STEP = 1.0  # of a bristle's or spring's own time sqrt(inertia / stiffness): half the limit of stability
 
 
 class Reaction(NamedTuple):
-    """What the plant did at the begin of a step, (n_v,) each.
+    """What the plant did at the begin of a step, (n_v,) each; the fields are the channels of a log.
 
-    ddq : [rad/s^2 or m/s^2]
-    coulomb_torque, law_torque : taken by ideal dry friction and by the passive laws [Nm or N]
+    q, dq, ddq : of the links [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
+    tau : of the motors [Nm or N]
+    coulomb_torque, law_torque : taken by ideal dry friction, and by everything passive beside the plant's own friction
+    motor_q, motor_dq, motor_ddq : of the motors, on the joint side; those of the links where joints are rigid
+    gear_torque : what the gear passes on to the link [Nm or N]
+    temperature : [deg C]; zero where the plant has none
+    external_torque : what the environment adds [Nm or N]
     """
 
+    q: FloatArray
+    dq: FloatArray
     ddq: FloatArray
+    tau: FloatArray
     coulomb_torque: FloatArray
     law_torque: FloatArray
+    motor_q: FloatArray
+    motor_dq: FloatArray
+    motor_ddq: FloatArray
+    gear_torque: FloatArray
+    temperature: FloatArray
+    external_torque: FloatArray
+
+
+CHANNELS = Reaction._fields
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RunningPlant:
     """A plant with its state; made by `started`, changed by `advance`.
 
-    model, data : own copies of the MuJoCo model and its state
-    joints : what the passive laws see and add up
-    memories : of the laws, one each
-    shared_inertia : (n_v, n_v) of the motors that turn with two joints
+    simulator : MuJoCo with copies of the plant's model and its data, of this run alone
+    machine, memory : the same as arrays, with all else that moves
+    laws : the passive laws, each with its part of the memory
     """
 
     plant: Plant
-    mujoco: Any
-    model: Any
-    data: Any
-    joints: JointState
-    memories: tuple[FloatArray, ...]
-    shared_inertia: FloatArray
+    simulator: Simulator
+    machine: Machine
+    memory: MachineState
+    laws: Laws
+
+    @property
+    def native(self) -> bool:
+        """Whether the kernel steps the plant, and not Python."""
+        return self.machine.engine.step != 0
 
     @property
     def state(self) -> tuple[FloatArray, FloatArray]:
-        """Position and velocity, (n_v,) each."""
-        return self.data.qpos[self.plant.dof], self.data.qvel[self.plant.dof]
+        """Position and velocity of the links, (n_v,) each."""
+        engine = self.machine.engine
+        return engine.qpos[engine.dof], engine.qvel[engine.dof]
+
+    @property
+    def motor_state(self) -> tuple[FloatArray, FloatArray]:
+        """Position and velocity of the motors on the joint side, (n_v,) each."""
+        return self.memory.shaft.copy(), self.memory.shaft_dq.copy()
+
+    @property
+    def shared_inertia(self) -> FloatArray:
+        """Inertia of the motors that turn with two joints, (n_v, n_v)."""
+        return self.machine.drives.shared
+
+    @property
+    def temperature(self) -> FloatArray:
+        """Temperatures of the joints, (n_v,) [deg C]; zero where the plant has none."""
+        return self.memory.temperature.copy()
 
     def place(self, q: FloatArray, dq: FloatArray) -> None:
-        """Put the plant into a state, its bristles as they are."""
-        self.data.qpos[self.plant.dof], self.data.qvel[self.plant.dof] = q, dq
+        """Put links and motors into a state; bristles and the springs of the gears stay bent as they are."""
+        engine = self.machine.engine
+        self.memory.shaft[:] += q - engine.qpos[engine.dof]
+        self.memory.shaft_dq[:] = dq
+        engine.qpos[engine.dof], engine.qvel[engine.dof] = q, dq
+
+    def push(self, torque: FloatArray) -> None:
+        """Let the environment add a torque (n_v,) to the links, until it is set again [Nm or N]."""
+        self.memory.external[:] = torque
 
     def advance(self, tau: FloatArray, steps: int = 1) -> Reaction:
         """Pass `steps` steps of time under the motor torque (n_v,), and return the reaction at the first."""
-        if self.plant.parameters.laws:
-            reaction = self._step_with_laws(tau)
-            for _ in range(steps - 1):
-                self._step_with_laws(tau)
-            return reaction
-        data, dof = self.data, self.plant.dof
-        data.qfrc_applied[dof] = tau - self.plant.parameters.offset
-        # mj_step first computes the acceleration at the present state and leaves it in qacc, then integrates:
-        # what is read after a single step belongs to the state read before it.
-        self.mujoco.mj_step(self.model, data)
-        reaction = Reaction(data.qacc[dof], -data.qfrc_constraint[dof], np.zeros(dof.size))
-        if steps > 1:
-            self.mujoco.mj_step(self.model, data, steps - 1)
-        return reaction
+        record = np.empty((len(CHANNELS), self.plant.robot.n_v))
+        tau = np.ascontiguousarray(tau, dtype=np.float64)
+        if self.native:
+            pass_period(self.machine, self.memory, tau, steps, record)
+        else:
+            self._advance_in_python(tau, steps, record)
+        return Reaction(*record)
 
-    def _step_with_laws(self, tau: FloatArray) -> Reaction:
-        data, dof, joints, truth = self.data, self.plant.dof, self.joints, self.plant.parameters
-        joints.q[:], joints.dq[:] = data.qpos[dof], data.qvel[dof]
-        joints.torque[:], joints.damping[:] = 0.0, 0.0
-        for law, memory in zip(truth.laws, self.memories, strict=True):
-            law.add(joints, memory)
-        driven = tau - truth.offset - joints.torque
-        self.model.dof_damping[dof] = truth.viscous + joints.damping
-        data.qfrc_applied[dof] = driven + joints.damping * joints.dq
-        self.mujoco.mj_step(self.model, data)
-        ddq, coulomb_torque = data.qacc[dof], -data.qfrc_constraint[dof]
-        shared = self.shared_inertia @ ddq
-        # The load that friction sees in the next step is what this one's equation of motion leaves for the links.
-        rigid = driven - coulomb_torque - truth.viscous * joints.dq - truth.rotor * ddq - shared
-        np.abs(rigid, out=joints.load)
-        moved = data.qpos[dof] - joints.q
-        for law, memory in zip(truth.laws, self.memories, strict=True):
-            law.advance(moved, memory)
-        return Reaction(ddq, coulomb_torque, joints.torque + shared)
+    def _advance_in_python(self, tau: FloatArray, steps: int, record: FloatArray) -> None:
+        memory = self.memory
+        for step in range(steps):
+            warm = memory.temperature.copy()
+            reference_step(self.simulator, self.machine, memory, laws=self.laws, tau=tau)
+            if step == 0:
+                record[:3], record[3] = (memory.q, memory.dq, memory.ddq), tau
+                record[4:6] = memory.dry, memory.law
+                record[6:9] = memory.motor, memory.motor_dq, memory.motor_ddq
+                record[9:] = memory.gear, warm, memory.external
+
+    def in_python(self) -> RunningPlant:
+        """Return the same plant, stepped from Python."""
+        engine = self.machine.engine._replace(step=0, forward=0, implicit=0)
+        return replace(self, machine=self.machine._replace(engine=engine))
 
 
 def started(plant: Plant, q: FloatArray) -> RunningPlant:
-    """Return the plant at rest in the pose q (n_v,), bristles unbent.
+    """Return the plant at rest in the pose q (n_v,), bristles unbent, elastic gears bent by gravity and springs.
 
     Raises
     ------
     SimulationError
         when a spring or bristle is too stiff for the plant's timestep.
     """
-    mujoco = load_mujoco()
-    laws, n_v = plant.parameters.laws, plant.robot.n_v
-    model = copy.copy(plant.model) if laws else plant.model
+    mujoco, truth = load_mujoco(), plant.parameters
+    model = copy.copy(plant.model)
     data = mujoco.MjData(model)
     data.qpos[plant.dof] = q
-    drives = [law.inertia_matrix(n_v) for law in laws if isinstance(law, SharedDrive)]
+    engine = engine_of(model, data, plant.dof, native_functions(mujoco))
+    memory = machine_state(truth)
+    pairs = zip(truth.laws, parts_of_memory(truth.laws, memory.memory), strict=True)
     running = RunningPlant(
         plant=plant,
-        mujoco=mujoco,
-        model=model,
-        data=data,
-        joints=resting_state(n_v),
-        memories=tuple(law.memory() for law in laws),
-        shared_inertia=np.sum(drives, axis=0) if drives else np.zeros((n_v, n_v)),
+        simulator=Simulator(mujoco, model, data),
+        machine=machine_of(truth, engine, plant.timestep),
+        memory=memory,
+        laws=tuple(pairs),
     )
-    if laws:
-        mujoco.mj_forward(model, data)
-        running.joints.load[:] = np.abs(data.qfrc_bias[plant.dof])
-        _refuse_stiff_laws(running)
+    mujoco.mj_forward(model, data)
+    gravity = data.qfrc_bias[plant.dof]
+    memory.load[:] = np.abs(gravity)
+    memory.shaft[:] = q + _bending(running, gravity)
+    _refuse_stiff_laws(running)
     return running
 
 
+def _bending(running: RunningPlant, gravity: FloatArray) -> FloatArray:
+    """Return by how much the motors must be ahead of their links to hold them, (n_v,)."""
+    drives, memory = running.machine.drives, running.memory
+    memory.q[:], _ = running.state
+    joints = resting_state(gravity.size)
+    joints.q[:] = memory.q
+    for law, part in running.laws:
+        if law.side == "link":
+            law.add(joints, part)
+    torque = gravity + joints.torque
+    stiffness = np.where(drives.stiffness > 0.0, drives.stiffness, np.inf)
+    return np.asarray(torque / stiffness + np.sign(torque) * drives.half_gap)
+
+
 def _refuse_stiff_laws(running: RunningPlant) -> None:
-    """Refuse a timestep at which a bristle would ring: judged by the inertia of each joint with the others free."""
-    plant, n_v = running.plant, running.plant.robot.n_v
+    """Refuse a timestep at which a bristle, or the teeth of a gear with a gap, would ring.
+
+    Judged by the inertia of each joint with the others free. An elastic gear without a gap may be as stiff as it likes.
+    """
+    plant, n_v, drives = running.plant, running.plant.robot.n_v, running.machine.drives
     inverse = np.empty((n_v, n_v))
-    running.mujoco.mj_solveM(running.model, running.data, inverse, np.eye(n_v))
-    mobility = np.diag(inverse)[plant.dof]
-    stiffness = np.sum([law.stiffness(running.joints.load) for law in plant.parameters.laws], axis=0)
-    longest = _LONGEST_STEP / np.sqrt(np.maximum(stiffness * mobility, np.finfo(float).tiny))
+    mujoco, model, data = running.simulator
+    mujoco.mj_solveM(model, data, inverse, np.eye(n_v))
+    link = np.diag(inverse)[plant.dof]
+    elastic = drives.stiffness > 0.0
+    motor = 1.0 / np.where(elastic, drives.rotor, np.inf)
+    rings = np.zeros(n_v)
+    for law, _ in running.laws:
+        mobility = link if law.side == "link" else np.where(elastic, motor, link)
+        rings += mobility * law.stiffness(running.memory.load)
+    teeth = np.where(drives.half_gap > 0.0, drives.stiffness * (motor + link), 0.0)
+    longest = _LONGEST_STEP / np.sqrt(np.maximum(np.maximum(rings, teeth), np.finfo(float).tiny))
     worst = int(np.argmin(longest))
     if longest[worst] < plant.timestep:
+        gap = teeth[worst] > rings[worst]
         raise SimulationError(
-            "the passive laws are too stiff for the timestep",
+            "the gap's teeth are too stiff for the timestep"
+            if gap
+            else "the passive laws are too stiff for the timestep",
             where=f"{plant.robot.name}, joint {plant.robot.joint_names[worst]}",
             expected=f"a timestep below {longest[worst]:.2g} s",
             got=f"{plant.timestep:.2g} s",
-            remedy="shorten the timestep, or lengthen the bristles",
+            remedy="shorten the timestep, or soften the spring"
+            if gap
+            else "shorten the timestep, or lengthen the bristles",
         )

@@ -1,7 +1,8 @@
 """The truth beside a simulated log, read back: what the plant was made of.
 
-Version 2 holds the plant as it is (`plant`), beside the standard and base parameters of the plain model that people
-read. Version 1, without a `schema_version`, held the latter only, which is all such a plant had.
+Version 3 holds the plant as it is (`plant`): links, drives, laws, elasticity, heat and what is attached. Version 2 had
+links, drives and laws. Beside it are the standard and base parameters of the plain model that people read. Version 1,
+without a `schema_version`, held the latter only, which is all such a plant had.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from tauhat.files import read_text
 from tauhat.simulation.parameters import DRIVES, SYMBOLS, TrueParameters
 
 SCHEMA = "tauhat.truth"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
+_WITH_A_PLANT = (2, 3)
 
 
 def plant_document(truth: TrueParameters) -> dict[str, Any]:
@@ -40,12 +42,12 @@ def load_true_parameters(path: str | Path) -> TrueParameters:
         version = document.get("schema_version", 1)
         if version == 1:
             return _from_names(document["parameters"])
-        if version == SCHEMA_VERSION and document.get("schema") == SCHEMA:
+        if version in _WITH_A_PLANT and document.get("schema") == SCHEMA:
             return TrueParameters.from_dict(document["plant"])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, TauhatError) as error:
         raise SimulationError("not a readable truth", where=path, got=error) from error
     remedy = "update tauhat, if the file is newer"
-    expected = f"{SCHEMA}, version 1 or {SCHEMA_VERSION}"
+    expected = f"{SCHEMA}, version 1 to {SCHEMA_VERSION}"
     raise SimulationError("unknown form of truth", where=path, expected=expected, got=version, remedy=remedy)
 
 

@@ -232,6 +232,7 @@ KINDS: Mapping[str, Callable[[Robot, TrueParameters, np.random.Generator], TrueP
     "gas-spring": _gas_spring,
     "cube-root-dahl-load": _everything,
 }
+"""Every kind of plant by the friction or drive that it has, and what makes it of nominal parameters."""
 _SHAPES: Mapping[type, tuple[str, Callable[[Any], FloatArray]]] = {
     SmoothCoulomb: ("coulomb", lambda law: law.width),
     DirectionalFriction: ("asymmetric", lambda law: law.width),

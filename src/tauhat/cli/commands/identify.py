@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tauhat.cli.options import (
+    ClusterOption,
     CutoffOption,
     FittedModelOption,
     JsonOption,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from tauhat.dynamics.model import TorqueModel
     from tauhat.estimation.estimate import Estimate
+    from tauhat.estimation.least_squares import Estimator
     from tauhat.estimation.physical_constraints import PhysicalConstraints
     from tauhat.recordings.recording import Recording
 
@@ -69,13 +71,22 @@ class Options:
     rows: RowsOption = None
     period: PeriodOption = None
     lock: LockOption = None
+    cluster: ClusterOption = None
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            metavar="N",
+            min=1,
+            help="Processes that read many logs, each its own; memory does not grow with their number.",
+            show_default="logs are read into memory",
+        ),
+    ] = None
     as_json: JsonOption = False
 
 
 def run(options: Options) -> None:
     """Identify a robot's torque model from recordings and write it as an estimate file."""
-    from tauhat.cli.inputs import averaged, read_recordings, robot_of_recordings
-    from tauhat.cli.models import model_of
     from tauhat.estimation.estimators import estimator_named
     from tauhat.files import check_output
 
@@ -83,29 +94,71 @@ def run(options: Options) -> None:
     check_output(
         options.output, inputs=[options.robot, *options.logs, *([options.map_file] if options.map_file else [])]
     )
+    away = options.cluster is not None or options.workers is not None
+    estimate = _identified_by_workers(options) if away else _identified_here(options)
+    estimate.save(options.output)
+    show(_document(estimate, options.output), lambda: _view(estimate, options), as_json=options.as_json)
+
+
+def _identified_here(options: Options) -> Estimate:
+    """Return the estimate of logs that are read into memory."""
+    from tauhat.cli.inputs import averaged, read_recordings, robot_of_recordings
+    from tauhat.cli.models import model_of
+
     with working("reading"):
         measured = read_recordings(options.logs, map_file=options.map_file, rows=options.rows)
         recordings = averaged(measured, period=options.period)
         robot = robot_of_recordings(options.robot, recordings, locked=options.lock)
         model = model_of(robot, options.model, recordings)
     with working("identifying"):
-        estimate = _identified(model, recordings, options)
-    estimate.save(options.output)
-    show(_document(estimate, options.output), lambda: _view(estimate, options), as_json=options.as_json)
+        return _identified(model, recordings, options)
+
+
+def _identified_by_workers(options: Options) -> Estimate:
+    """Return the estimate of logs that workers read."""
+    from tauhat.cli.inputs import robot_of_recordings, sources_of
+    from tauhat.cli.models import AUTO, model_of
+    from tauhat.cluster import workers_of
+    from tauhat.errors import ModelError
+    from tauhat.estimation.log_survey import survey_logs
+    from tauhat.estimation.many_logs import check_evidence_alone, identify_files
+
+    estimator = _estimator(options)
+    check_evidence_alone(estimator)
+    if options.model.strip() == AUTO:
+        raise ModelError(
+            "the choice of terms reads all logs itself", got="--model auto", remedy="leave out --cluster and --workers"
+        )
+    workers = workers_of(options.cluster, options.workers)
+    with working("reading"):
+        sources = sources_of(options.logs, map_file=options.map_file, rows=options.rows, period=options.period)
+        logs = survey_logs(sources, workers=workers)
+        robot = robot_of_recordings(options.robot, logs.facts, locked=options.lock)
+        model = model_of(robot, options.model, logs.facts)
+    with working("identifying"):
+        return identify_files(
+            model, logs, estimator=estimator, cutoff=options.cutoff, constraints=_constraints(options)
+        )
+
+
+def _estimator(options: Options) -> Estimator:
+    from tauhat.estimation.essential import EssentialLeastSquares
+    from tauhat.estimation.estimators import estimator_named
+
+    named = estimator_named(options.estimator)
+    return EssentialLeastSquares(inner=named) if options.essential else named
 
 
 def _identified(model: TorqueModel, recordings: Sequence[Recording], options: Options) -> Estimate:
     """Return the estimate, of the model that cross-validation chose where that was asked for."""
     from tauhat.cli.models import AUTO
-    from tauhat.estimation.essential import EssentialLeastSquares
-    from tauhat.estimation.estimators import estimator_named
     from tauhat.estimation.identify import identify
     from tauhat.estimation.selecting import identify_selected
 
-    named = estimator_named(options.estimator)
-    estimator = EssentialLeastSquares(inner=named) if options.essential else named
     way = identify_selected if options.model.strip() == AUTO else identify
-    return way(model, recordings, estimator=estimator, cutoff=options.cutoff, constraints=_constraints(options))
+    return way(
+        model, recordings, estimator=_estimator(options), cutoff=options.cutoff, constraints=_constraints(options)
+    )
 
 
 def _constraints(options: Options) -> PhysicalConstraints | None:

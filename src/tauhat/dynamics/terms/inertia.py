@@ -59,7 +59,7 @@ class Inertia(Term):
         whole = np.zeros((10 * robot.n_v, robot.n_v, motion.n_t))
         for joint, (rows, bar) in enumerate(zip(self.support(robot), bars, strict=True)):
             whole[rows, joint] = bar
-        adjoint_kernel(*kernel_tree(robot).geometry, motion.q, motion.dq, motion.ddq, whole, *gradient)
+        adjoint_kernel(kernel_tree(robot).links, motion.q, motion.dq, motion.ddq, whole, tuple(gradient))
 
 
 def _rows(columns: FloatArray, rows: IntArray) -> FloatArray:

@@ -1,7 +1,8 @@
 """Friction that grows with the load: `Fl |tau_load| s`, the rigid-body torque through the gear times a friction state.
 
 The load is computed from rigid-body parameters that the term carries: the robot's nominal ones at first, then those
-that the pass before found (`Term.after`). Two passes are enough, since the load enters a small term.
+that the pass before found (`Term.after`). Two passes are enough, since the load enters a small term. What a rotor takes
+never passes through the gear, also where links and rotor are one number: that number less the rotor is the load.
 
 Source: Hamon, Gautier, Garrec, "Dynamic identification of robots with a dry friction model depending on load and
 velocity", 2010.
@@ -46,6 +47,7 @@ class LoadCoulomb(ShapedTerm):
 
     widths : per joint [rad/s or m/s]; empty until chosen, and then the plain sign is taken
     inertia : rigid-body parameters of the pass before, (10 n_v,); empty: the robot's nominal ones
+    rotors : taken off these, (n_v,) [kg m^2 or kg], where the fit has links and rotor in one number; empty: nothing
     """
 
     key: ClassVar[str] = "load-coulomb"
@@ -57,10 +59,12 @@ class LoadCoulomb(ShapedTerm):
     grid: ClassVar[tuple[float, ...]] = WIDTHS
     widths: tuple[float, ...] = ()
     inertia: tuple[float, ...] = ()
+    rotors: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         super(LoadCoulomb, self).__post_init__()
         object.__setattr__(self, "inertia", tuple(float(value) for value in self.inertia))
+        object.__setattr__(self, "rotors", tuple(float(value) for value in self.rotors))
 
     def units(self, joint: Joint) -> tuple[str, ...]:
         """Return one: torque over torque."""
@@ -73,9 +77,10 @@ class LoadCoulomb(ShapedTerm):
         sign = np.tanh(motion.dq / self.chosen(robot.n_v, 0.0)) if self.widths else np.sign(motion.dq)
         return (load_on_joints(robot, motion, self.inertia) * sign)[:, None], state
 
-    def after(self, inertia: FloatArray) -> Term:
+    def after(self, inertia: FloatArray, rotors: FloatArray | None = None) -> Term:
         """Return the term with the load of these parameters."""
-        return replace(self, inertia=tuple(inertia.ravel().tolist()))
+        taken_off = () if rotors is None or not rotors.any() else tuple(rotors.tolist())
+        return replace(self, inertia=tuple(inertia.ravel().tolist()), rotors=taken_off)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,6 +88,7 @@ class LoadDahl(JointTerm):
     """Pre-sliding friction in proportion to the load, beside `dahl`: `Fl |tau_load| z` with the shorter length.
 
     inertia : rigid-body parameters of the pass before, (10 n_v,); empty: the robot's nominal ones
+    rotors : taken off these, (n_v,) [kg m^2 or kg], where the fit has links and rotor in one number; empty: nothing
     """
 
     key: ClassVar[str] = "load-dahl"
@@ -93,10 +99,12 @@ class LoadDahl(JointTerm):
     symbols: ClassVar[tuple[str, ...]] = ("Fl",)
     smallest: ClassVar[float] = 0.0
     inertia: tuple[float, ...] = ()
+    rotors: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         super(LoadDahl, self).__post_init__()
         object.__setattr__(self, "inertia", tuple(float(value) for value in self.inertia))
+        object.__setattr__(self, "rotors", tuple(float(value) for value in self.rotors))
 
     def units(self, joint: Joint) -> tuple[str, ...]:
         """Return one: torque over torque."""
@@ -109,6 +117,7 @@ class LoadDahl(JointTerm):
         bent, after = dahl_states(motion.q, np.full((robot.n_v, 1), LENGTHS[0]), state)
         return load_on_joints(robot, motion, self.inertia)[:, None] * bent, after
 
-    def after(self, inertia: FloatArray) -> Term:
+    def after(self, inertia: FloatArray, rotors: FloatArray | None = None) -> Term:
         """Return the term with the load of these parameters."""
-        return replace(self, inertia=tuple(inertia.ravel().tolist()))
+        taken_off = () if rotors is None or not rotors.any() else tuple(rotors.tolist())
+        return replace(self, inertia=tuple(inertia.ravel().tolist()), rotors=taken_off)

@@ -110,6 +110,12 @@ class Term(ABC):
         """
         raise ModelError(f"term {self.key} has no shape to choose")
 
-    def after(self, inertia: FloatArray) -> Term:
-        """Return the term for the next pass, given the rigid-body parameters (n_v, 10) that the last one found."""
+    def after(self, inertia: FloatArray, rotors: FloatArray | None = None) -> Term:
+        """Return the term for the next pass, given the rigid-body parameters that the last one found.
+
+        Parameters
+        ----------
+        inertia : (n_v, 10), without rotors
+        rotors : (n_v,) that were taken off, where the fit has links and rotor in one number; none by default
+        """
         return self

@@ -25,7 +25,7 @@ _ACCELERATED = ("Iam",)  # symbols of other terms that act on accelerations
 class PointAccelerations:
     """The forward dynamics of a model at points of state and base parameters.
 
-    geometry : arrays of the robot that kernels read
+    links : of the robot, as kernels read them
     inertial, rotor : base parameters that are of links and of rotors
     inertial_place, rotor_place : where they go in (n_v, 10) and (n_v,), flattened
     others : the model of all other terms, None when there is none
@@ -34,7 +34,7 @@ class PointAccelerations:
     """
 
     n_v: int
-    geometry: tuple[NDArray[np.generic], ...]
+    links: NDArray[np.void]
     inertial: IntArray
     inertial_place: IntArray
     rotor: IntArray
@@ -68,7 +68,7 @@ class PointAccelerations:
         out = np.empty((n, self.n_v))
         bodies = (inertia.reshape(n, self.n_v, 10), rotor)
         states = (np.ascontiguousarray(q), np.ascontiguousarray(dq), free)
-        if points_kernel(self.geometry, bodies, states, out) >= 0:
+        if points_kernel(self.links, bodies, states, out) >= 0:
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
         return out
 
@@ -111,7 +111,7 @@ def point_accelerations(model: TorqueModel, base: BaseParameters) -> PointAccele
     others = replace(model, terms=terms) if terms else None
     return PointAccelerations(
         n_v=model.robot.n_v,
-        geometry=kernel_tree(model.robot).geometry,
+        links=kernel_tree(model.robot).links,
         inertial=_column(inertial, 0),
         inertial_place=_column(inertial, 1),
         rotor=_column(rotor, 0),

@@ -47,6 +47,7 @@ from tauhat.errors import ModelError
 from tauhat.estimation.filters.beginning import Beginning, FirstStretch
 from tauhat.estimation.filters.outcome import Found, Recursion, residual_weights, solution_of
 from tauhat.estimation.filters.samples import motion_samples, refuse_memory, row_samples
+from tauhat.estimation.friction import braking_parameters
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.solution import Solution
 from tauhat.recordings.processing import Stretch
@@ -239,12 +240,11 @@ def parallel_model(
             expected=f"<= {0.5 / (2.0 * np.pi * step):.3g} Hz",
             got=f"{settings.bandwidth:g} Hz",
         )
-    braking = np.array([term.dissipates for term in problem.model.terms for _ in term.parameters(problem.model.robot)])
     bare = ParallelModel(
         model=problem.model,
         layout=problem.model.layout(base.independent),
         supports=problem.evidence.supports,
-        braking=braking[base.independent],
+        braking=braking_parameters(problem.model)[base.independent],
         gain=np.ones(problem.model.robot.n_v),
         inertia=np.ones(problem.model.robot.n_v),
         least=_LEAST[1],

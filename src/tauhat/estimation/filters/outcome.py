@@ -12,7 +12,7 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError, TauhatWarning
 from tauhat.estimation.evidence import Evidence
-from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares
+from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.solution import (
     Solution,
@@ -62,7 +62,14 @@ class Recursion(Estimator):
 
 
 def residual_weights(evidence: Evidence) -> tuple[FloatArray, FloatArray]:
-    """Return the residual of each joint after weighted least squares [Nm or N], and one over it, (n_v,) each."""
+    """Return the residual of each joint after weighted least squares [Nm or N], and one over it, (n_v,) each.
+
+    Raises
+    ------
+    ModelError
+        when there are no more rows than parameters: nothing would be left over, and a filter take its torque for exact.
+    """
+    check_rows(evidence)
     residual = joint_residuals(evidence, WeightedLeastSquares().solve(evidence).values)
     floor = 1e-6 * joint_torques(evidence).max()
     deviation = np.maximum(residual, floor)

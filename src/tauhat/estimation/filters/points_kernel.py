@@ -8,18 +8,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved
+from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved, sweep_outward
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def points_kernel(geometry, bodies, states, out):  # type: ignore[no-untyped-def]
+def points_kernel(links, bodies, states, out):  # type: ignore[no-untyped-def]
     """Fill `out` (n, n_v) from bodies ((n, n_v, 10), (n, n_v)) and states q, dq, tau; return a failed point or -1."""
     inertia, rotor = bodies
     q, dq, tau = states
     n, n_v = q.shape
     work, bias, mass = np.empty(40 * n_v), np.empty(n_v), np.empty((n_v, n_v))
     for k in range(n):
-        bias_and_mass(*geometry, inertia[k], q[k], dq[k], work, bias, mass)
+        sweep_outward(links, inertia[k], q[k], dq[k], work)
+        bias_and_mass(links, work, bias, mass)
         for i in range(n_v):
             mass[i, i] += rotor[k, i]
             out[k, i] = tau[k, i] - bias[i]

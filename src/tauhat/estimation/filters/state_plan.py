@@ -36,7 +36,7 @@ class StateNoise:
         given: tuple[float, ...] = getattr(self, name)
         if not given:
             return found
-        if len(given) != found.size or not min(given) > 0.0:
+        if len(given) != found.size or not all(0.0 < value < np.inf for value in given):
             raise ModelError(f"noise of the {name}", expected=f"{found.size} positive values", got=given)
         return np.array(given)
 
@@ -105,6 +105,8 @@ class ClockedRecording(NamedTuple):
 def clocked_recording(recording: Recording, delay: float, *, rate: float, longest_step: float) -> ClockedRecording:
     """Return the recording with measurements at most at `rate` [Hz] and its torque in steps of at most `longest_step`.
 
+    Where the recording's own steps are longer, they are cut into equal ones, the torque on straight lines between.
+
     Raises
     ------
     ModelError
@@ -114,19 +116,21 @@ def clocked_recording(recording: Recording, delay: float, *, rate: float, longes
         raise ModelError("no torque in the log", where=recording.name)
     clock = uniform_clock(recording, delay)
     ticks_a_step = max(1, int(longest_step / clock.step + 1e-9))
+    parts = max(1, int(np.ceil(clock.step / longest_step - 1e-9)))  # of a tick, where it is too long for one step
     n_steps = max(1, round(1.0 / (rate * clock.step * ticks_a_step)))
     every = n_steps * ticks_a_step
     count = (clock.n_t - 1) // every
     time = every * clock.step
     if count < 2 * max(1, round(_RUN_UP / time)):
         raise ModelError("too short to filter", where=recording.name, got=f"{count} measurements at {1.0 / time:g} Hz")
-    ticks = clock.ticks(0, count * every + 1)
-    torque = interpolated(recording.t, recording.tau, ticks[:-1] + 0.5 * clock.step)
-    mean = torque.reshape(recording.n_v, count, n_steps, ticks_a_step).mean(axis=3).transpose(1, 2, 0)
-    coarse = ticks[::every]
+    part = clock.step / parts
+    middles = np.asarray(clock.start + part * (np.arange(count * every * parts) + 0.5), dtype=np.float64)
+    torque = interpolated(recording.t, recording.tau, middles)
+    mean = torque.reshape(recording.n_v, count, n_steps * parts, ticks_a_step).mean(axis=3).transpose(1, 2, 0)
+    coarse = clock.ticks(0, count * every + 1)[::every]
     q = interpolated(recording.t, unwrapped(recording.q), coarse + delay).T
     dq = None if recording.dq is None else interpolated(recording.t, recording.dq, coarse + delay).T
-    return ClockedRecording(time, ticks_a_step * clock.step, coarse, q, dq, mean)
+    return ClockedRecording(time, ticks_a_step * part, coarse, q, dq, mean)
 
 
 def measurement_noise(signal: FloatArray) -> FloatArray:

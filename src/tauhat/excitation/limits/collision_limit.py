@@ -28,7 +28,8 @@ from tauhat.excitation.limits.motion_limit import MotionLimit, Pull
 from tauhat.excitation.limits.solids import LinkSolid
 from tauhat.robots.robot import Robot
 
-FAR = 0.1  # [m] beyond the clearance at which nothing is near any more: a margin of one
+FAR = 0.1
+"""Distance beyond the clearance at which nothing is near any more, a margin of one [m]."""
 _ALWAYS = 0.95  # part of random poses in which links touch that cannot be kept apart
 _SAME = 1e-9  # [m] heights nearer than this are one
 _TOUCHING = 1e-9  # [m] nearer segments than this cross

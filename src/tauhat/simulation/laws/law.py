@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, NamedTuple, TypeAlias
+from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import SimulationError
 
 TrueValues: TypeAlias = Mapping[tuple[str, int], float]
+Side: TypeAlias = Literal["motor", "link"]
 
 
 class JointState(NamedTuple):
@@ -42,10 +43,14 @@ def resting_state(n_v: int) -> JointState:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PassiveLaw(ABC):
-    """A passive torque with given parameters; `letters` names the standard parameter that each coefficient is."""
+    """A passive torque with given parameters; `letters` names the standard parameter that each coefficient is.
+
+    `side` of an elastic transmission it acts on: friction on the motor, springs on the link.
+    """
 
     key: ClassVar[str]
     letters: ClassVar[Mapping[str, str]]
+    side: ClassVar[Side] = "motor"
 
     @abstractmethod
     def check(self, n_v: int) -> None:
@@ -58,6 +63,10 @@ class PassiveLaw(ABC):
     @abstractmethod
     def add(self, joints: JointState, memory: FloatArray) -> None:
         """Add the law's torque and damping at this state."""
+
+    @abstractmethod
+    def rows(self) -> FloatArray:
+        """Return the law's parameters as rows of numbers, in the order that `program_kernel` reads them."""
 
     def memory(self) -> FloatArray:
         """Return the law's internal state at the start; empty for laws without one."""
@@ -115,6 +124,10 @@ class JointLaw(PassiveLaw):
         """Refuse a robot of another number of joints."""
         if n_v != self.n_v:
             raise SimulationError(f"law {self.key} of another robot", expected=f"{n_v} joints", got=self.n_v)
+
+    def rows(self) -> FloatArray:
+        """Return the parameters in the order of the fields, (k, n_v)."""
+        return np.array([getattr(self, field.name) for field in fields(self)])
 
     def true_values(self) -> TrueValues:
         """Return the coefficients, by symbol and joint."""

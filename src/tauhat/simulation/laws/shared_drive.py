@@ -63,6 +63,11 @@ class SharedDrive(PassiveLaw):
         dry = {(self.letters[name], self.own): float(getattr(self.dry, name)[0]) for name in self.dry.letters}
         return values | dry
 
+    def rows(self) -> FloatArray:
+        """Return own joint, other joint, ratio and viscous friction, then those of the dry friction, (k, 1)."""
+        own = np.array([self.own, self.other, self.ratio, self.viscous], dtype=np.float64)
+        return np.concatenate([own[:, None], self.dry.rows()])
+
     def memory(self) -> FloatArray:
         """Return the start of the dry friction."""
         return self.dry.memory()

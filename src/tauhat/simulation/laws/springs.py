@@ -11,7 +11,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.errors import SimulationError
-from tauhat.simulation.laws.law import JointLaw, JointState, PassiveLaw, TrueValues
+from tauhat.simulation.laws.law import JointLaw, JointState, PassiveLaw, Side, TrueValues
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,6 +23,7 @@ class BalancingSpring(JointLaw):
 
     key: ClassVar[str] = "spring"
     letters: ClassVar[Mapping[str, str]] = {"rate": "Ks"}
+    side: ClassVar[Side] = "link"
     rate: FloatArray
 
     def add(self, joints: JointState, memory: FloatArray) -> None:
@@ -51,6 +52,7 @@ class GasCylinder(PassiveLaw):
 
     key: ClassVar[str] = "gas-cylinder"
     letters: ClassVar[Mapping[str, str]] = {"energy": "Gs"}
+    side: ClassVar[Side] = "link"
     joint: int
     energy: float
     distance: float
@@ -72,6 +74,11 @@ class GasCylinder(PassiveLaw):
     def true_values(self) -> TrueValues:
         """Return the gas's energy."""
         return {("Gs", self.joint): self.energy}
+
+    def rows(self) -> FloatArray:
+        """Return joint, energy, distance, lever, angle, area and volume, (7, 1)."""
+        values = (self.joint, self.energy, self.distance, self.lever, self.angle, self.area, self.volume)
+        return np.array(values, dtype=np.float64)[:, None]
 
     def add(self, joints: JointState, memory: FloatArray) -> None:
         """Add the cylinder's torque at this position."""
