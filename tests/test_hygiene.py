@@ -62,7 +62,19 @@ HOMES = {
     "typer": {"cli"},
     "distributed": {"cluster"},
 }
-HEAVY = ("numba", "pinocchio", "mujoco", "plotly", "polars", "scipy", "jinja2", "viser", "rich.table", "pandas", "distributed")
+HEAVY = (
+    "numba",
+    "pinocchio",
+    "mujoco",
+    "plotly",
+    "polars",
+    "scipy",
+    "jinja2",
+    "viser",
+    "rich.table",
+    "pandas",
+    "distributed",
+)
 
 
 def imports(parts: tuple[str, ...]) -> Iterator[str]:

@@ -77,20 +77,17 @@ class DiesOnce:
 
 @dataclass(frozen=True)
 class LosingWorkers(Workers):
-    """A cluster that loses a worker in every map and every reduction, at the item in the middle."""
+    """A cluster that loses a worker in its first map and in its first reduction, at the item in the middle."""
 
     cluster: ClusterWorkers
     folder: Path
 
     def map(self, function, items):
         given = list(items)
-        yield from self.cluster.map(self._deadly(function, given), given)
+        yield from self.cluster.map(self._deadly(function, given, "map"), given)
 
     def reduce(self, merge, function, items):
-        return self.cluster.reduce(merge, self._deadly(function, items), items)
+        return self.cluster.reduce(merge, self._deadly(function, items, "reduce"), items)
 
-    def losses(self) -> int:
-        return len(list(self.folder.glob("died-*")))
-
-    def _deadly(self, function, items):
-        return DiesOnce(function, items[len(items) // 2], self.folder / f"died-{self.losses()}")
+    def _deadly(self, function, items, way):
+        return DiesOnce(function, items[len(items) // 2], self.folder / way)

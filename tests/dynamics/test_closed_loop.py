@@ -96,6 +96,14 @@ def test_the_simulated_motion_obeys_the_torque_model(method):
     assert np.abs(torque - moved.tau).max() < {"leapfrog": 3e-4, "runge-kutta": 1e-12}[method]
 
 
+def test_a_held_torque_is_logged_as_the_motor_begins_to_deliver_it():
+    coarse, fine = (slid(method=method, substeps=20, hold=20) for method in METHODS)
+    late = slice(50, None)
+    assert np.abs(coarse.tau - fine.tau)[:, late].max() < 1e-3 * np.abs(fine.tau).max()
+    moved = MASS * coarse.ddq + FRICTION * coarse.dq
+    assert np.abs(moved - coarse.tau)[:, late].max() < 1e-3 * np.abs(coarse.tau).max()
+
+
 def test_leapfrog_is_of_second_order_and_runge_kutta_of_fourth():
     fine = planar(method="runge-kutta", substeps=32)[2].q
     for method, order in (("leapfrog", 2), ("runge-kutta", 4)):

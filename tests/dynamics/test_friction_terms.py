@@ -291,11 +291,6 @@ def test_a_mixture_takes_every_joints_own_pick() -> None:
     assert forms[0].mixed(forms, [2, 0]) == Stribeck(speeds=(3.0, 10.0))
 
 
-def test_terms_without_a_shape_cannot_be_mixed() -> None:
-    with pytest.raises(ModelError, match="term viscous has no shape to choose"):
-        Viscous().mixed([Viscous()], [0])
-
-
 def test_joints_without_a_term_have_no_parameter_of_it() -> None:
     term = CubeRoot(joints=(False, True))
     assert [p.name for p in term.parameters(planar_arm())] == ["Fr_2"]

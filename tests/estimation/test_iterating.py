@@ -12,7 +12,8 @@ from tauhat.dynamics import TorqueModel, base_parameters, torque_model
 from tauhat.dynamics.terms import Coulomb, LoadCoulomb, LoadDahl, Viscous
 from tauhat.estimation import OrdinaryLeastSquares, WeightedLeastSquares, identify
 from tauhat.estimation.evidence import collect_all
-from tauhat.estimation.iterating import first_loaded, iterated, rigid_parameters
+from tauhat.estimation.iterating import first_loaded, iterated
+from tauhat.estimation.rotor_load import rigid_parameters
 
 WIDTHS = (0.05, 0.05)
 DRY = {"Fv": 0.5, "Fc": (0.8, 0.5)}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -15,21 +14,18 @@ pytest.importorskip("distributed")
 
 from sample_arms import planar_arm, planar_truth
 from tauhat.cluster import ClusterWorkers
-from tauhat.dynamics import base_parameters, torque_model
+from tauhat.dynamics import torque_model
 from tauhat.errors import ModelError, RecordingError, TauhatWarning
 from tauhat.estimation import (
     ESTIMATORS,
     EssentialLeastSquares,
     Estimate,
-    Evidence,
     HuberLeastSquares,
     OrdinaryLeastSquares,
     PhysicalConstraints,
     PriorLeastSquares,
     TotalLeastSquares,
     WeightedLeastSquares,
-    collect,
-    collect_all,
     identify,
     identify_files,
     survey_logs,
@@ -52,7 +48,7 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> tuple[LogSource, ...]:
     folder = tmp_path_factory.mktemp("logs")
     paths = [folder / f"run-{seed}.parquet" for seed in range(COUNT)]
     for seed, path in enumerate(paths):
-        seconds = 6.0 + seed
+        seconds = 5.0 + 0.5 * seed
         noise = np.random.default_rng(seed).normal(size=(round(200 * seconds), 2)) * [0.4, 0.2]
         write_recording(TRUTH.recording(seed=seed, seconds=seconds, noise=noise), path)
     return tuple(LogSource(path=path) for path in paths)
@@ -80,10 +76,10 @@ def test_a_cluster_gives_the_estimate_of_one_process_also_where_passes_follow_ea
     assert_same(identify_files(ROBUST, survey_logs(sources, workers=workers)), here)
 
 
-def test_a_worker_killed_in_every_pass_changes_nothing(sources, workers, tmp_path):
+def test_workers_killed_while_they_read_and_collect_change_nothing(sources, workers, tmp_path):
     losing = LosingWorkers(workers, tmp_path)
     found = identify_files(TRUTH.model, survey_logs(sources, workers=losing), processing=SETTINGS)
-    assert losing.losses() >= 3  # survey, sample, evidence
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map", "reduce"]
     assert_same(found, identify(TRUTH.model, [source.read() for source in sources], processing=SETTINGS))
 
 
@@ -185,18 +181,9 @@ def test_the_sample_has_a_share_of_each_log_and_of_many_twenty():
     assert sampled_rows([500, 60_000])[0] == 500
 
 
-def test_the_tree_of_merges_gives_the_values_of_merges_in_a_row_in_any_order(sources):
+def test_error_bars_do_not_depend_on_the_order_in_which_logs_are_named(sources):
     recordings = [source.read() for source in sources]
-    base = base_parameters(TRUTH.model)
-    tree = collect_all(TRUTH.model, base, recordings, SETTINGS)
-    parts = [collect(TRUTH.model, base, recording, SETTINGS) for recording in recordings]
-    method = WeightedLeastSquares()
-    expected = method.fit(tree)
-    for order in ([0, 1, 2, 3, 4], [4, 2, 0, 1, 3], [3, 4, 1, 0, 2]):
-        row = reduce(Evidence.merged, [parts[place] for place in order])
-        other = method.fit(row)
-        assert row.n_t == tree.n_t
-        assert np.abs(other.values - expected.values).max() < 1e-9 * np.abs(expected.values).max()
-        assert np.abs(other.joint_rms - expected.joint_rms).max() < 1e-9 * expected.joint_rms.max()
-        ratio = np.sqrt(np.diag(other.covariance) / np.diag(expected.covariance))
-        print(order, ratio.min(), ratio.max(), other.degrees, expected.degrees)
+    expected = identify(TRUTH.model, recordings, processing=SETTINGS)
+    for order in ([4, 2, 0, 1, 3], [3, 4, 1, 0, 2]):
+        other = identify(TRUTH.model, [recordings[place] for place in order], processing=SETTINGS)
+        assert_same(replace(other, inputs=expected.inputs), expected)

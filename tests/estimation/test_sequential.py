@@ -128,6 +128,8 @@ def test_a_joint_without_segments_is_named():
 def test_bad_rules_are_refused():
     with pytest.raises(ModelError, match="rules of segments"):
         SegmentRules(bins=0)
+    with pytest.raises(ModelError, match="rules of segments"):
+        SegmentRules(window=float("nan"))
 
 
 def test_viscous_friction_is_left_to_the_second_step_where_there_are_reversals_alone():

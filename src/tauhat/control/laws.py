@@ -42,7 +42,7 @@ class TrackingLaw(ABC):
             raise ArrayError("a gain is negative", where=where, got=f"kp {kp.min():g}, kd {kd.min():g}")
         object.__setattr__(self, "kp", kp)
         object.__setattr__(self, "kd", kd)
-        object.__setattr__(self, "torque_limit", _limit(self.torque_limit, kp.size, where))
+        object.__setattr__(self, "torque_limit", joint_limits(self.torque_limit, kp.size, where))
 
     @property
     def n_v(self) -> int:
@@ -160,7 +160,14 @@ class PID(TrackingLaw):
         return integral + np.where(winding, 0.0, period * error), torque
 
 
-def _limit(value: FloatArray, n_v: int, where: str) -> FloatArray:
+def joint_limits(value: FloatArray, n_v: int, where: str) -> FloatArray:
+    """Return a torque limit a joint, (n_v,) read-only; one value counts for all.
+
+    Raises
+    ------
+    ArrayError
+        when there is not one a joint, or one is not positive.
+    """
     given = np.asarray(value, dtype=np.float64)
     if given.shape not in {(), (n_v,)}:
         raise ArrayError("torque_limit has the wrong shape", where=where, expected=(n_v,), got=given.shape)

@@ -53,7 +53,7 @@ def leapfrog_kernel(arm, task, start, out):  # type: ignore[no-untyped-def]
             if code != FINE:
                 return code, k, joint
             if s == 0:
-                _record(rows, law, k, out)
+                _record((rows, memory[3][0]), task, k, out)
             failed = _move(elements, times, rows, bent)
             if failed >= 0:
                 return RAN_AWAY, k, failed
@@ -124,8 +124,20 @@ def _begin(start, rows):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _record(rows, law, k, out):  # type: ignore[no-untyped-def]
+def _record(found, task, k, out):  # type: ignore[no-untyped-def]
+    """Log a sample; a torque that is held jumps there, and the log shows what the motor begins to deliver.
+
+    `found` are rows and the factor of the mass matrix that the step was solved with.
+    """
+    (rows, factor), (law, _, times) = found, task
     q, u, v, a, d, tau, free = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[8]
+    if times[2] > 0:
+        jump = rows[10] - tau
+        solved(factor, jump)
+        for j in range(q.size):
+            out[0, j, k], out[1, j, k], out[2, j, k] = q[j], u[j] + 0.5 * d[j], a[j] + jump[j]
+            out[3, j, k] = rows[10, j]
+        return
     for j in range(q.size):
         speed = u[j] + 0.5 * d[j]
         out[0, j, k], out[1, j, k], out[2, j, k] = q[j], speed, a[j]

@@ -66,7 +66,8 @@ class ElasticSettings:
         if self.side not in {"motor", "link"}:
             raise ModelError("side of the encoders", expected="motor or link", got=self.side)
         ordered = 0.0 < self.band[0] < self.band[1] and 0.0 < self.ratios[0] < self.ratios[1]
-        if not (ordered and self.factor > 1.0 and self.starts >= 1 and 0.0 < self.significance < 1.0):
+        counts = self.starts >= 1 and self.trend >= 0
+        if not (ordered and counts and self.factor > 1.0 and self.apart > 0.0 and 0.0 < self.significance < 1.0):
             raise ModelError("search box of elastic joints", expected="rising positive bounds", got=self)
 
 

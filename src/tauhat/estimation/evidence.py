@@ -22,6 +22,7 @@ from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.errors import ModelError
+from tauhat.estimation.block_merging import halved, thinned
 from tauhat.estimation.rows import Rows, filtered_rows
 from tauhat.recordings.processing import CHUNK, Processing
 from tauhat.recordings.recording import Recording
@@ -37,10 +38,12 @@ class Block:
 
     factors : per joint (k, p_j + 1), k <= p_j + 1 after reduction; the last column is the torque
     n_t : number of rows that went in, per joint
+    log : which recording they are of, for `block_merging`
     """
 
     factors: tuple[FloatArray, ...]
     n_t: int
+    log: str = ""
 
     def __post_init__(self) -> None:
         for factor in self.factors:
@@ -49,11 +52,16 @@ class Block:
     def merged(self, other: Block) -> Block:
         """Return the block of both stretches."""
         pairs = zip(self.factors, other.factors, strict=True)
-        return Block(factors=tuple(_reduced(np.vstack(pair)) for pair in pairs), n_t=self.n_t + other.n_t)
+        factors = tuple(_reduced(np.vstack(pair)) for pair in pairs)
+        return Block(factors=factors, n_t=self.n_t + other.n_t, log=self.log)
 
     def reduced(self) -> Block:
         """Return the same block with every factor no taller than wide."""
-        return Block(factors=tuple(_reduced(factor) for factor in self.factors), n_t=self.n_t)
+        return replace(self, factors=tuple(_reduced(factor) for factor in self.factors))
+
+    def of_log(self, log: str) -> Block:
+        """Return the same block under the name of a recording."""
+        return replace(self, log=log)
 
 
 def _reduced(rows: FloatArray) -> FloatArray:
@@ -85,6 +93,7 @@ class Evidence:
     blocks : consecutive stretches of time, at most 64
     recordings : names of the recordings inside
     fingerprint : of the model whose columns these are
+    merged_length : blocks of a log up to this length were merged with their neighbours to make room [rows]
     total : the factors of all blocks together
     """
 
@@ -93,6 +102,7 @@ class Evidence:
     blocks: tuple[Block, ...]
     recordings: tuple[str, ...] = ()
     fingerprint: str = ""
+    merged_length: int = 0
     total: Block = field(init=False)
 
     def __post_init__(self) -> None:
@@ -111,7 +121,7 @@ class Evidence:
         return sum(block.n_t for block in self.blocks)
 
     def merged(self, other: Evidence) -> Evidence:
-        """Return the evidence of both; any order of merging gives the same estimate.
+        """Return the evidence of both; any order of merging gives the same estimate and the same error bars.
 
         Raises
         ------
@@ -120,8 +130,10 @@ class Evidence:
         """
         if self.n_b != other.n_b or self.fingerprint != other.fingerprint:
             raise ModelError("evidence of different models cannot be merged")
-        blocks = _at_most((*self.blocks, *other.blocks), MOST_BLOCKS)
-        return replace(self, blocks=blocks, recordings=(*self.recordings, *other.recordings))
+        length = max(self.merged_length, other.merged_length)
+        blocks, length = thinned((*self.blocks, *other.blocks), MOST_BLOCKS, merged_length=length)
+        recordings = (*self.recordings, *other.recordings)
+        return replace(self, blocks=blocks, recordings=recordings, merged_length=length)
 
     def keeping(self, columns: IntArray) -> Evidence:
         """Return the evidence on some of the parameters alone, as if the others were not in the model.
@@ -134,9 +146,9 @@ class Evidence:
         place[columns] = np.arange(columns.size)
         picked = [np.flatnonzero(place[support] >= 0) for support in self.supports]
         blocks = tuple(
-            Block(
+            replace(
+                block,
                 factors=tuple(factor[:, np.append(own, -1)] for factor, own in zip(block.factors, picked, strict=True)),
-                n_t=block.n_t,
             )
             for block in self.blocks
         )
@@ -159,13 +171,8 @@ def _together(blocks: tuple[Block, ...]) -> Block:
 
 def _at_most(blocks: tuple[Block, ...], most: int) -> tuple[Block, ...]:
     while len(blocks) > most:
-        blocks = _halved(blocks)
+        blocks = halved(blocks)
     return blocks
-
-
-def _halved(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
-    pairs = [blocks[k].merged(blocks[k + 1]) for k in range(0, len(blocks) - 1, 2)]
-    return (*pairs, blocks[-1]) if len(blocks) % 2 else tuple(pairs)
 
 
 def collect(
@@ -191,6 +198,8 @@ def collect(
     layout = model.layout(base.independent)
     rows = filtered_rows(model, layout, recording, processing, chunk=chunk)
     blocks = tuple(_grown_blocks(layout, rows) if most_blocks > 1 else _one_block(layout, rows))
+    log = f"{recording.name} {recording.t[0]} {recording.n_t}"  # windows of one file have the same name
+    blocks = tuple(block.of_log(log) for block in blocks)
     return _evidence(layout, base, blocks, name=recording.name, fingerprint=model.fingerprint)
 
 
@@ -209,7 +218,8 @@ def evidence_from_rows(
     ----------
     first_rows : of a block before the first merges; a stream of known length needs none
     """
-    blocks = tuple(_grown_blocks(layout, rows, first_rows) if most_blocks > 1 else _one_block(layout, rows))
+    grown = _grown_blocks(layout, rows, first_rows) if most_blocks > 1 else _one_block(layout, rows)
+    blocks = tuple(block.of_log(name) for block in grown)
     return _evidence(layout, base, blocks, name=name, fingerprint="")
 
 
@@ -246,7 +256,7 @@ def _grown_blocks(layout: Layout, rows: Iterable[Rows], first_rows: int = _FIRST
                 done.append(open_block.reduced())
                 open_block = None
             if len(done) == MOST_BLOCKS:
-                done = list(_halved(tuple(done)))
+                done = list(halved(done))
                 size *= 2
     if open_block is not None:
         done = _with_rest(done, open_block.reduced(), size)
@@ -278,8 +288,7 @@ def collect_all(
 ) -> Evidence:
     """Return the merged evidence of several recordings; `most_blocks` of each.
 
-    It is merged as a tree, as workers merge theirs: the blocks of all recordings are thinned out alike, and error bars
-    are the same wherever the work is done.
+    It is merged as a tree, as workers merge theirs, so that even its rounding is the same wherever the work is done.
     """
     parts = (collect(model, base, recording, processing, most_blocks=most_blocks) for recording in recordings)
     return merged_as_tree(Evidence.merged, parts)

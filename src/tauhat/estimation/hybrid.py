@@ -25,7 +25,7 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
-from tauhat.dynamics.terms import ShapedTerm
+from tauhat.dynamics.terms import Shaped
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.losses import Cauchy, Loss
@@ -67,7 +67,7 @@ class HybridLeastSquares(ReweightedLeastSquares):
 
     def _reshaped(self, problem: Problem) -> TorqueModel:
         """Return the model with every chosen shape looked at again on the rows as the fit weighs them."""
-        model, shaped = problem.model, [term for term in problem.model.terms if isinstance(term, ShapedTerm)]
+        model, shaped = problem.model, [term for term in problem.model.terms if isinstance(term, Shaped)]
         gather = self._gathering(problem) if any(term.shape for term in shaped) else None
         for term in shaped:
             if not term.shape:

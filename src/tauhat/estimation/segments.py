@@ -47,7 +47,7 @@ class SegmentRules:
 
     def __post_init__(self) -> None:
         positive = (self.shortest, self.change, self.alike, self.pose, self.window)
-        if not (min(positive) > 0.0 and self.bins >= 1):
+        if not (all(value > 0.0 for value in positive) and self.bins >= 1):
             raise ModelError("rules of segments", expected="positive numbers, at least one bin", got=self)
 
 

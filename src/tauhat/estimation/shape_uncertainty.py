@@ -21,7 +21,7 @@ from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.motion import Motion
-from tauhat.dynamics.terms import Parameter, ShapedTerm, Term
+from tauhat.dynamics.terms import Parameter, Shaped, Term
 from tauhat.estimation.evidence import Block, Evidence
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.rotor_load import RotorLoad, rotor_load
@@ -37,49 +37,54 @@ _FAINT = 1e-6  # of the largest such column: a term that is not there has no sha
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShapeSlope(Term):
-    """The derivative of a shaped term's torque by the logarithm of its shape, one parameter a joint.
+    """The derivative of a shaped term's torque by the logarithm of each value of its shape, one parameter a value.
 
-    term : with its shapes
-    coefficients : of the term's columns, joint by joint as its parameters
+    term : with its shape
+    coefficients : of the term's columns, as its parameters
     """
 
     key: ClassVar[str] = "shape-slope"
     stateful: ClassVar[bool] = True
-    term: ShapedTerm
+    term: Shaped
     coefficients: tuple[float, ...]
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
-        """Return one parameter a joint that has the term."""
-        return tuple(Parameter(symbol="dln", joint=int(joint), unit="1") for joint in self.term.present(robot))
+        """Return one parameter for each value that shapes anything."""
+        return tuple(
+            Parameter(symbol="dln", joint=joint, unit="1") for joint in self.term.shaped_joints(robot).values()
+        )
 
     def support(self, robot: Robot) -> tuple[IntArray, ...]:
-        """Return each joint's own parameter."""
-        place = {int(joint): index for index, joint in enumerate(self.term.present(robot))}
-        return tuple(np.array([place[j]] if j in place else [], dtype=np.intp) for j in range(robot.n_v))
+        """Return for each joint the values that shape what loads it."""
+        values, shaping = np.array(list(self.term.shaped_joints(robot)), dtype=np.intp), self.term.shaping(robot)
+        return tuple(np.flatnonzero(np.isin(values, shaping[own])) for own in self.term.support(robot))
 
     def columns(
         self, robot: Robot, motion: Motion, state: FloatArray | None
     ) -> tuple[tuple[FloatArray, ...], FloatArray | None]:
         """Return the difference quotient; the states of both its ends are stacked."""
         before = (None, None) if state is None else (state[0], state[1])
-        upper, after_upper = self._torque(robot, motion, 1.0 + _STEP, before[0])
-        lower, after_lower = self._torque(robot, motion, 1.0 / (1.0 + _STEP), before[1])
+        upper, after_upper = self._torques(robot, motion, 1.0 + _STEP, before[0])
+        lower, after_lower = self._torques(robot, motion, 1.0 / (1.0 + _STEP), before[1])
         width = 2.0 * np.log1p(_STEP)
         slopes = tuple((up - low) / width for up, low in zip(upper, lower, strict=True))
         if after_upper is None or after_lower is None:
             return slopes, None
         return slopes, np.stack([after_upper, after_lower])
 
-    def _torque(
+    def _torques(
         self, robot: Robot, motion: Motion, factor: float, state: FloatArray | None
     ) -> tuple[tuple[FloatArray, ...], FloatArray | None]:
+        """Return on each joint the torque of the columns that each value of its support shapes, (n_support, n_t)."""
         form = self.term.with_shape([factor * value for value in self.term.shape])
         columns, after = form.columns(robot, motion, state)
-        values = np.array(self.coefficients)
-        supports = self.term.support(robot)
-        made = (values[own] @ rows for own, rows in zip(supports, columns, strict=True))
-        empty = np.zeros((0, motion.n_t))
-        return tuple(row[None] if own.size else empty for row, own in zip(made, supports, strict=True)), after
+        weights, shaping = np.array(self.coefficients), self.term.shaping(robot)
+        values = np.array(list(self.term.shaped_joints(robot)), dtype=np.intp)
+        torques = []
+        for rows, own, places in zip(columns, self.term.support(robot), self.support(robot), strict=True):
+            picked = shaping[own] == values[places][:, None]
+            torques.append((picked * weights[own]) @ rows)
+        return tuple(torques), after
 
 
 Slope: TypeAlias = ShapeSlope | RotorLoad
@@ -123,10 +128,10 @@ def nearer_shapes(problem: Problem, solution: Solution, keys: Collection[str]) -
         return model
     moves, start = _moves(problem, slopes, values=solution.values, weights=solution.weights), 0
     for slope in slopes:
-        present = slope.term.present(model.robot)
-        factors = np.ones(model.robot.n_v)
-        factors[present] = np.exp(np.clip(moves[start : start + present.size], -_LARGEST_MOVE, _LARGEST_MOVE))
-        start += present.size
+        places = list(slope.term.shaped_joints(model.robot))
+        factors = np.ones(len(slope.term.shape))
+        factors[places] = np.exp(np.clip(moves[start : start + len(places)], -_LARGEST_MOVE, _LARGEST_MOVE))
+        start += len(places)
         model = model.with_term(slope.term.with_shape((factors * slope.term.shape).tolist()))
     return model
 
@@ -163,7 +168,7 @@ def _slopes(problem: Problem, solution: Solution) -> tuple[ShapeSlope, ...]:
         count = len(term.parameters(model.robot))
         own = standard[start : start + count]
         start += count
-        if isinstance(term, ShapedTerm) and term.shape and own.any():
+        if isinstance(term, Shaped) and term.shape and own.any():
             slopes.append(ShapeSlope(term=term, coefficients=tuple(own.tolist())))
     return tuple(slopes)
 

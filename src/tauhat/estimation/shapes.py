@@ -1,9 +1,9 @@
 """Shapes of terms, joint by joint, by variable projection on evidence.
 
 All forms of a term stand side by side as columns of one evidence: a single pass over the recordings. Choosing one form
-a joint is then choosing columns of its factor. The linear parameters of the whole model are solved for every choice, so
-that only the shape is searched; joints are visited in turn, since what one joint's friction does not explain, another's
-inertia may.
+a joint (or shared motor) is then choosing columns of its factor. The linear parameters of the whole model are solved
+for every choice, so that only the shape is searched; joints are visited in turn, since what one joint's friction does
+not explain, another's inertia may.
 
 Source: Golub, Pereyra, "The differentiation of pseudo-inverses and nonlinear least squares problems whose variables
 separate", 1973.
@@ -11,7 +11,7 @@ separate", 1973.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -20,7 +20,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
-from tauhat.dynamics.terms import Bank, ShapedTerm, Term
+from tauhat.dynamics.terms import Bank, Shaped
 from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.solution import joint_residuals, joint_torques, weighted_rows
 from tauhat.recordings.processing import Processing
@@ -36,12 +36,12 @@ _RIDGE = 1e-7  # on columns of unit norm: a form that the motion never shows mus
 def chosen_form(
     model: TorqueModel,
     base: BaseParameters,
-    forms: Sequence[Term],
+    forms: Sequence[Shaped],
     recordings: Sequence[Recording],
     processing: Processing,
     *,
     gather: Gather | None = None,
-) -> Term:
+) -> Shaped:
     """Return the mixture of `forms` of one of the model's terms that leaves the least residual.
 
     Parameters
@@ -49,26 +49,24 @@ def chosen_form(
     base : of the model with the term in any of its forms
     gather : makes the evidence; of all rows alike by default
 
-    A shape that is one number a joint is then looked at more closely around the best of its forms.
+    The shape is then looked at more closely around the best of the forms.
     """
     take = gather or (lambda wide, kept: collect_all(wide, kept, recordings, processing, most_blocks=1))
     best = _mixture(model, base, forms, take)
-    if not isinstance(best, ShapedTerm):
-        return best
     closer = [best.with_shape([factor * value for value in best.shape]) for factor in FINER]
     return _mixture(model, base, closer, take)
 
 
-def _mixture(model: TorqueModel, base: BaseParameters, forms: Sequence[Term], gather: Gather) -> Term:
-    choice = _choice(model, base, forms, gather)
-    alike = [choice.residual([form] * model.robot.n_v) for form in range(len(forms))]
-    picks, level = [int(np.argmin(alike))] * model.robot.n_v, min(alike)
+def _mixture(model: TorqueModel, base: BaseParameters, forms: Sequence[Shaped], gather: Gather) -> Shaped:
+    choice, values = _choice(model, base, forms, gather), len(forms[0].shape)
+    alike = [choice.residual([form] * values) for form in range(len(forms))]
+    picks, level = [int(np.argmin(alike))] * values, min(alike)
     for _ in range(_SWEEPS):
         before = list(picks)
-        for joint in choice.joints:
-            tried = [choice.residual([*picks[:joint], pick, *picks[joint + 1 :]]) for pick in range(len(forms))]
+        for value in choice.owned:
+            tried = [choice.residual([*picks[:value], pick, *picks[value + 1 :]]) for pick in range(len(forms))]
             if min(tried) < (1.0 - LEAST_GAIN) * level:
-                picks[joint], level = int(np.argmin(tried)), min(tried)
+                picks[value], level = int(np.argmin(tried)), min(tried)
         if picks == before:
             break
     return forms[0].mixed(forms, picks)
@@ -79,19 +77,17 @@ class _Choice:
     """The weighted triangle of all columns, and which of them belong to which form.
 
     triangle : (n, n + 1) with columns of unit norm and the torque last
-    rest : columns of the other terms
-    owned : per joint and form, the form's columns
-    joints : those that have the term
+    rest : columns of the other terms, and those of this one that no value shapes
+    owned : place of a value in the shape -> per form, the columns that it shapes
     """
 
     triangle: FloatArray
     rest: IntArray
-    owned: tuple[tuple[IntArray, ...], ...]
-    joints: tuple[int, ...]
+    owned: Mapping[int, tuple[IntArray, ...]]
 
     def residual(self, picks: Sequence[int]) -> float:
-        """Return the weighted residual when joint j takes form `picks[j]`."""
-        own = [self.owned[joint][picks[joint]] for joint in self.joints]
+        """Return the weighted residual when value k of the shape is that of form `picks[k]`."""
+        own = [columns[picks[value]] for value, columns in self.owned.items()]
         columns = np.concatenate([self.rest, *own, [self.triangle.shape[1] - 1]])
         count = columns.size - 1
         damped = np.vstack([self.triangle[:, columns], _RIDGE * np.eye(count, count + 1)])
@@ -99,29 +95,31 @@ class _Choice:
         return abs(float(reduced[count, count]))
 
 
-def _choice(model: TorqueModel, base: BaseParameters, forms: Sequence[Term], gather: Gather) -> _Choice:
+def _choice(model: TorqueModel, base: BaseParameters, forms: Sequence[Shaped], gather: Gather) -> _Choice:
     key = forms[0].key
     place = next(index for index, term in enumerate(model.terms) if term.key == key)
     bank = Bank(forms=tuple(forms))
     banked = replace(model, terms=(*model.terms[:place], bank, *model.terms[place + 1 :]))
     start = sum(len(term.parameters(model.robot)) for term in model.terms[:place])
-    size = len(forms[0].parameters(model.robot))
+    shaping = forms[0].shaping(model.robot)
+    size = shaping.size
     more = size * (len(forms) - 1)
     others = base.independent[(base.independent < start) | (base.independent >= start + size)]
     moved = np.where(others < start, others, others + more)
-    kept = np.sort(np.concatenate([moved, np.arange(start, start + size + more)]))
-    wide = _kept_set(banked, kept)
-    evidence = gather(banked, wide)
-    supports = forms[0].support(model.robot)
-    owned = tuple(
-        tuple(np.searchsorted(kept, start + form * size + support) for form in range(len(forms)))
-        for support in supports
-    )
+    unshaped = start + np.flatnonzero(shaping < 0)
+    shaped = start + np.flatnonzero(np.tile(shaping, len(forms)) >= 0)
+    kept = np.sort(np.concatenate([moved, unshaped, shaped]))
+    evidence = gather(banked, _kept_set(banked, kept))
+    owned = {
+        int(value): tuple(
+            np.searchsorted(kept, start + form * size + np.flatnonzero(shaping == value)) for form in range(len(forms))
+        )
+        for value in np.unique(shaping[shaping >= 0])
+    }
     return _Choice(
         triangle=_weighted_triangle(evidence),
-        rest=np.searchsorted(kept, moved),
+        rest=np.searchsorted(kept, np.concatenate([moved, unshaped])),
         owned=owned,
-        joints=tuple(joint for joint, support in enumerate(supports) if support.size),
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
-from tauhat.dynamics.terms import Facts
+from tauhat.dynamics.terms import Facts, Shaped
 from tauhat.errors import TauhatWarning
 from tauhat.estimation.delay import position_delay
 from tauhat.estimation.evidence import collect_all
@@ -130,12 +130,11 @@ def _shortened(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
 
 
 def _informed(model: TorqueModel, recordings: Sequence[Recording]) -> TorqueModel:
-    """Return the model with what the recordings tell before any fit in the terms that have one form."""
+    """Return the model with what the recordings tell before any fit: all but shapes that are still open."""
     facts = _facts(recordings)
     for term in model.terms:
         forms = term.candidates(facts)
-        if len(forms) == 1:
-            model = model.with_term(forms[0])
+        model = model.with_term(forms[0] if len(forms) == 1 else term.informed(facts))
     return model
 
 
@@ -149,7 +148,8 @@ def _shaped(
 ) -> TorqueModel:
     """Return the model with every open shape chosen; terms are visited in turn until none of them changes."""
     facts = _facts(recordings)
-    choices = [forms for term in model.terms if len(forms := term.candidates(facts)) > 1]
+    open_terms = [every for term in model.terms if len(every := term.candidates(facts)) > 1]
+    choices = [[form for form in forms if isinstance(form, Shaped)] for forms in open_terms]
     for _ in range(_SWEEPS if len(choices) > 1 else 1):
         before = model.terms
         for forms in choices:

@@ -101,7 +101,8 @@ def _motor_lines(parameters: StandardParameters) -> Iterator[str]:
     yield "Motors that turn with two joints:"
     for index, (own, other, ratio) in enumerate(coupled.motors):
         yield f"  q[{own}] + {ratio!r} q[{other}]: inertia {float(coupled.inertia[index])!r},"
-        yield f"      viscous {float(coupled.viscous[index])!r}, dry {_row(coupled.dry[index])}"
+        scale = f", scales {coupled.scales[index]!r}" if coupled.scales else ""
+        yield f"      viscous {float(coupled.viscous[index])!r}, dry {_row(coupled.dry[index])}{scale}"
 
 
 def _row(values: FloatArray) -> str:

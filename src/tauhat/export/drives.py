@@ -33,6 +33,7 @@ class CoupledMotors:
     inertia, viscous : (n_motors,) [kg m^2, Nm s/rad] or [kg, N s/m]
     dry : (n_motors, 1) of a sign, or (n_motors, 2) of two Dahl states [Nm or N]
     widths : (n_motors,) of the smooth sign [rad/s]; empty for the plain one, and with Dahl states
+    scales : (n_motors,) of the lengths of Dahl states; empty: one
     """
 
     motors: tuple[SharedMotor, ...]
@@ -40,15 +41,22 @@ class CoupledMotors:
     viscous: FloatArray
     dry: FloatArray
     widths: tuple[float, ...] = ()
+    scales: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.motors)
         for name, shape in (("inertia", (count,)), ("viscous", (count,)), ("dry", (count, None))):
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape, where="coupled motors"))
-        if self.widths and len(self.widths) != count:
-            raise ExportError("one width a motor is needed", where="coupled motors", got=len(self.widths))
+        for name, values in (("width", self.widths), ("scale", self.scales)):
+            if values and len(values) != count:
+                raise ExportError(f"one {name} a motor is needed", where="coupled motors", got=len(values))
         if self.dry.shape[1] not in {1, len(LENGTHS)}:
             raise ExportError("dry friction is of one sign or two Dahl states", where="coupled motors")
+
+    def lengths(self, motor: int) -> tuple[float, ...]:
+        """Return the lengths over which a motor's Dahl states turn round [rad or m]."""
+        scale = self.scales[motor] if self.scales else 1.0
+        return tuple(scale * length for length in LENGTHS)
 
     @property
     def has_memory(self) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, frozen
 from tauhat.dynamics.model import TorqueModel
-from tauhat.dynamics.terms import INERTIAL_SYMBOLS, Coupling, GasSpring, Term
+from tauhat.dynamics.terms import INERTIAL_SYMBOLS, Coupling, CouplingDahl, GasSpring, Term
 from tauhat.errors import ExportError
 from tauhat.estimation.estimate import Estimate
 from tauhat.export.drives import CoupledMotors, LoadedGasSpring
@@ -117,10 +117,11 @@ def _motors(parts: Parts) -> CoupledMotors | None:
         term, values = parts.get(key, (None, np.zeros(0)))
         if isinstance(term, Coupling) and term.motors:
             table = values.reshape(len(term.motors), -1)  # Iam, Fvm, dry friction, motor by motor
-            widths = () if key == "coupling-dahl" else term.widths
             return CoupledMotors(
-                motors=term.motors, inertia=table[:, 0], viscous=table[:, 1], dry=table[:, 2:], widths=widths
-            )
+                motors=term.motors, inertia=table[:, 0], viscous=table[:, 1], dry=table[:, 2:],
+                widths=() if isinstance(term, CouplingDahl) else term.widths,
+                scales=term.scales if isinstance(term, CouplingDahl) else (),
+            )  # fmt: skip
     return None
 
 

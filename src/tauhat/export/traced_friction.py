@@ -75,7 +75,7 @@ def _motor_friction(
         width = coupled.widths[index] if coupled.widths else 0.0
         return float(coefficients[0]) * _sign(trace, along(trace, way, dq), width)
     total = trace.scalar(0.0)
-    for coefficient, length in zip(coefficients, LAWS["dahl"].lengths, strict=True):
+    for coefficient, length in zip(coefficients, coupled.lengths(index), strict=True):
         if coefficient:
             total = total + float(coefficient) * dry.state(way, length)
     return total

@@ -21,7 +21,8 @@ FINE = -1
 @njit(cache=True, nogil=True, error_model="numpy")
 def pass_period(machine, state, tau, steps, record):  # type: ignore[no-untyped-def]
     """Pass some steps under one torque; fill record (n_channels, n_v) with the begin of the first."""
-    record[10] = state.temperature
+    for j in range(tau.size):
+        record[10, j] = state.temperature[j]
     for step in range(steps):
         pass_step(machine, state, tau)
         if step == 0:
@@ -45,7 +46,7 @@ def run_loop(machine, state, steering, course, log):  # type: ignore[no-untyped-
         _delay(steering, step, command, tau)
         pass_period(machine, state, tau, steering.substeps, record)
         if row >= 0 and row % course.stride == 0:
-            log[row // course.stride] = record
+            _copy(record, log[row // course.stride])
     return FINE
 
 
@@ -91,17 +92,25 @@ def _command(steering, course, row, command):  # type: ignore[no-untyped-def]
 def _delay(steering, step, command, tau):  # type: ignore[no-untyped-def]
     """Put the command at the end of the queue and take out the one that is due."""
     n = steering.queue.shape[0]
-    if n == 0:
-        tau[:] = command
-    else:
-        tau[:] = steering.queue[step % n]
-        steering.queue[step % n] = command
+    for j in range(tau.size):
+        tau[j] = command[j] if n == 0 else steering.queue[step % n, j]
+        if n > 0:
+            steering.queue[step % n, j] = command[j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _copy(values, out):  # type: ignore[no-untyped-def]
+    # Element by element, here and elsewhere: Numba takes seconds to compile the assignment of a slice.
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            out[i, j] = values[i, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _note(state, tau, record):  # type: ignore[no-untyped-def]
     """Write down the begin of a step, in the order of `running.CHANNELS`; the temperature is there already."""
-    record[0], record[1], record[2], record[3] = state.q, state.dq, state.ddq, tau
-    record[4], record[5], record[6] = state.dry, state.law, state.motor
-    record[7], record[8], record[9] = state.motor_dq, state.motor_ddq, state.gear
-    record[11] = state.external
+    for j in range(tau.size):
+        record[0, j], record[1, j], record[2, j], record[3, j] = state.q[j], state.dq[j], state.ddq[j], tau[j]
+        record[4, j], record[5, j], record[6, j] = state.dry[j], state.law[j], state.motor[j]
+        record[7, j], record[8, j], record[9, j] = state.motor_dq[j], state.motor_ddq[j], state.gear[j]
+        record[11, j] = state.external[j]

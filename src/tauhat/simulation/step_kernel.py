@@ -57,7 +57,8 @@ def pass_step(machine, state, tau):  # type: ignore[no-untyped-def]
 def _springs(machine, state):  # type: ignore[no-untyped-def]
     """Add up the laws that act on the links."""
     program, work = machine.program, state.work
-    state.spring[:] = 0.0
+    for j in range(state.q.size):
+        state.spring[j] = 0.0
     joints = JointState(state.q, state.dq, state.load, state.spring, work[PART_SLOPE])
     for i in range(program.kinds.size):
         if on_the_link(program.kinds[i]):
@@ -70,15 +71,15 @@ def _friction(machine, state):  # type: ignore[no-untyped-def]
     program, warming, work = machine.program, machine.warming, state.work
     _at_temperature(warming, 0, state, machine.drives.viscous, work[VISCOUS])
     _at_temperature(warming, 1, state, machine.drives.coulomb, work[COULOMB])
-    state.friction[:] = 0.0
-    state.slope[:] = 0.0
     part, part_slope = work[PART], work[PART_SLOPE]
     joints = JointState(state.motor, state.motor_dq, state.load, part, part_slope)
+    for j in range(part.size):
+        state.friction[j], state.slope[j] = 0.0, 0.0
     for i in range(program.kinds.size):
         if on_the_link(program.kinds[i]):
             continue
-        part[:] = 0.0
-        part_slope[:] = 0.0
+        for j in range(part.size):
+            part[j], part_slope[j] = 0.0, 0.0
         add_law(program, i, state.memory, joints, state.single)
         if warming.active:
             _at_temperature(warming, 2 + i, state, part, part)

@@ -14,7 +14,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.model import TorqueModel, torque_model
-from tauhat.dynamics.terms import GasSpring, ShapedTerm
+from tauhat.dynamics.terms import GasSpring, Shaped
 from tauhat.errors import SimulationError
 from tauhat.robots.robot import Robot
 from tauhat.simulation.laws import (
@@ -79,11 +79,13 @@ def with_true_shapes(model: TorqueModel, truth: TrueParameters) -> TorqueModel:
     """Return the model whose widths, speeds and scales are those of the plant, practically sharp where it is sharp."""
     shapes = {"coulomb": _SHARPEST * top_speeds(model.robot)}
     for law in truth.laws:
-        if type(law) in _SHAPES:
+        if isinstance(law, SharedDrive) and isinstance(law.dry, Bristles):
+            shapes["coupling-dahl"] = law.dry.fine_length / LENGTHS[0]
+        elif type(law) in _SHAPES:
             key, shape = _SHAPES[type(law)]
             shapes[key] = shape(law)
     for term in model.terms:
-        if isinstance(term, ShapedTerm) and term.key in shapes:
+        if isinstance(term, Shaped) and term.key in shapes:
             model = model.with_term(term.with_shape(shapes[term.key].tolist()))
     return model
 

@@ -11,11 +11,13 @@ import numpy as np
 from tauhat.arrays import FloatArray, read_only
 from tauhat.blas import single_threaded
 from tauhat.errors import ModelError
+from tauhat.estimation.confidence import student_quantile
 from tauhat.estimation.estimate import Estimate, InputLog, input_log
-from tauhat.estimation.rows import filtered_rows
 from tauhat.recordings.processing import STANDSTILL, Processing
 from tauhat.recordings.recording import Recording
 from tauhat.robots.joint import Joint
+from tauhat.verification.bands import PredictionBand, half_bands, prediction_band
+from tauhat.verification.series import Kinematics, joined, predicted_rows, temperature_at
 
 PARTS = 10  # stretches of time, and bins of speed, that the error is told for
 
@@ -30,6 +32,7 @@ class JointError:
     worst, worst_at : largest error [Nm or N] and its time [s]
     by_time : rms error in ten equal stretches of time [Nm or N]
     by_speed : rms error in ten bins from zero to the joint's largest speed; nan where there is no sample
+    band : how wide the 95 % band is, of the parameters alone and with the residual, and how often it holds
     """
 
     name: str
@@ -42,6 +45,7 @@ class JointError:
     by_time: tuple[float, ...]
     by_speed: tuple[float, ...]
     top_speed: float
+    band: PredictionBand
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,6 +56,12 @@ class LogPrediction:
     relative_rms, rms, r2 : all joints stacked
     moving_relative_rms : relative_rms over the rows in which some joint is faster than 2 % of its top speed
     t : (n,) [s]; tau, predicted, dq : (n, n_v), filtered and decimated, standstill at both ends left out
+    q, ddq : (n, n_v) [rad, rad/s^2] or [m, m/s^2], likewise
+    load : (n, n_v) the part of the predicted torque that the links take, without rotors and friction [Nm or N]
+    std : (n, n_v) standard error of the predicted torque, from the parameters alone [Nm or N]
+    level : (n_v,) root mean square residual of the fit: model error and noise, which no covariance knows [Nm or N]
+    quantile : of the parameters' errors, by Student's t: half a 95 % interval is that many standard errors
+    temperature : (n, n_v) [deg C], where it was logged
     """
 
     log: str
@@ -65,6 +75,23 @@ class LogPrediction:
     tau: FloatArray
     predicted: FloatArray
     dq: FloatArray
+    q: FloatArray
+    ddq: FloatArray
+    load: FloatArray
+    std: FloatArray
+    level: FloatArray
+    quantile: float
+    temperature: FloatArray | None = None
+
+    @property
+    def parameter_band(self) -> FloatArray:
+        """Half of the 95 % band of the predicted torque that the parameters' errors make, (n, n_v) [Nm or N]."""
+        return self.quantile * self.std
+
+    @property
+    def whole_band(self) -> FloatArray:
+        """Half of the 95 % band in which the measured torque should lie: parameters and residual, (n, n_v)."""
+        return half_bands(self.parameter_band, self.level)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures, without the series, as plain data."""
@@ -80,6 +107,7 @@ class LogPrediction:
                 "by_time": list(joint.by_time),
                 "by_speed": [value if np.isfinite(value) else None for value in joint.by_speed],
                 "top_speed": joint.top_speed,
+                "band": joint.band.to_dict(),
             }
             for joint in self.joints
         ]
@@ -125,54 +153,60 @@ def verify(
 
 def predict_recording(estimate: Estimate, recording: Recording, *, processing: Processing) -> LogPrediction:
     """Return measured and predicted torque of one recording and their difference in figures."""
-    model, base = estimate.model, estimate.base
-    layout = model.layout(base.independent)
-    place = np.empty(len(base.names))
-    place[base.independent] = estimate.values
-    weights = place[layout.parameters]
-    times, measured, predicted, speeds = [], [], [], []
-    for rows in filtered_rows(model, layout, recording, processing):
-        joints = [layout.of_joint(joint) for joint in range(model.robot.n_v)]
-        predicted.append(np.array([weights[part] @ rows.columns[part] for part in joints]))
-        times.append(rows.t)
-        measured.append(rows.tau)
-        speeds.append(rows.dq)
-    if not times:
-        raise ModelError("no row of the recording is left to verify on", where=recording.name)
-    series = [np.ascontiguousarray(np.concatenate(part, axis=1).T) for part in (measured, predicted, speeds)]
-    return _log_prediction(estimate, input_log(recording), _Series(np.concatenate(times), *series))
+    pieces = [
+        piece._replace(own=())
+        for piece in predicted_rows(estimate, recording, processing=processing, probes=Kinematics())
+    ]
+    rows = joined(pieces, recording)
+    series = {name: _time_first(getattr(rows, name)) for name in ("tau", "predicted", "std", "load", "dq")}
+    error = series["tau"] - series["predicted"]
+    quantile = student_quantile(estimate.degrees)
+    bands = [
+        prediction_band(error[:, j], quantile * series["std"][:, j], level=float(estimate.joint_rms[j]))
+        for j in range(estimate.robot.n_v)
+    ]
+    joints = tuple(
+        _joint_error(joint, _Joint(rows.t, *(series[name][:, j] for name in ("tau", "predicted", "dq"))), bands[j])
+        for j, joint in enumerate(estimate.robot.joints)
+    )
+    temperature = temperature_at(recording, rows.t)
+    log = input_log(recording)
+    return LogPrediction(
+        log=log.name,
+        input=log,
+        joints=joints,
+        **_overall(error, series["tau"], series["dq"]),
+        t=read_only(rows.t),
+        q=_time_first(np.array([own[0] for own in rows.probes])),
+        ddq=_time_first(np.array([own[1] for own in rows.probes])),
+        level=estimate.joint_rms,
+        quantile=quantile,
+        temperature=None if temperature is None else read_only(temperature),
+        **series,
+    )
 
 
-class _Series(NamedTuple):
-    """Times (n,) and measured torque, predicted torque and velocity, (n, n_v) each, or (n,) for one joint."""
+class _Joint(NamedTuple):
+    """Times and one joint's measured torque, predicted torque and velocity, (n,) each."""
 
     t: FloatArray
     tau: FloatArray
     predicted: FloatArray
     dq: FloatArray
 
-    def of_joint(self, joint: int) -> _Series:
-        return _Series(self.t, self.tau[:, joint], self.predicted[:, joint], self.dq[:, joint])
+
+def _time_first(rows: FloatArray) -> FloatArray:
+    return np.asarray(read_only(np.ascontiguousarray(rows.T)))
 
 
-def _log_prediction(estimate: Estimate, log: InputLog, series: _Series) -> LogPrediction:
-    t, tau, predicted, dq = series
-    error = tau - predicted
+def _overall(error: FloatArray, tau: FloatArray, dq: FloatArray) -> dict[str, float]:
     moving = (np.abs(dq) > STANDSTILL * np.abs(dq).max(axis=0)).any(axis=1)
-    joints = tuple(_joint_error(joint, series.of_joint(k)) for k, joint in enumerate(estimate.robot.joints))
-    return LogPrediction(
-        log=log.name,
-        input=log,
-        relative_rms=_ratio(error, tau),
-        rms=float(np.sqrt(np.mean(error**2))),
-        r2=_r2(error, tau),
-        moving_relative_rms=_ratio(error[moving], tau[moving]),
-        joints=joints,
-        t=read_only(t),
-        tau=read_only(tau),
-        predicted=read_only(predicted),
-        dq=read_only(dq),
-    )
+    return {
+        "relative_rms": _ratio(error, tau),
+        "rms": float(np.sqrt(np.mean(error**2))),
+        "r2": _r2(error, tau),
+        "moving_relative_rms": _ratio(error[moving], tau[moving]),
+    }
 
 
 def _ratio(error: FloatArray, tau: FloatArray) -> float:
@@ -185,7 +219,7 @@ def _r2(error: FloatArray, tau: FloatArray) -> float:
     return 1.0 - float(np.sum(error**2)) / spread if spread > 0 else 0.0
 
 
-def _joint_error(joint: Joint, series: _Series) -> JointError:
+def _joint_error(joint: Joint, series: _Joint, band: PredictionBand) -> JointError:
     t, tau, predicted, dq = series
     error = tau - predicted
     speed = np.abs(dq)
@@ -204,6 +238,7 @@ def _joint_error(joint: Joint, series: _Series) -> JointError:
         by_time=tuple(float(np.sqrt(np.mean(part**2))) if part.size else 0.0 for part in in_time),
         by_speed=tuple(_rms_or_nan(error[bins == k]) for k in range(PARTS)),
         top_speed=top,
+        band=band,
     )
 
 

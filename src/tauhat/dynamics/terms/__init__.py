@@ -16,6 +16,7 @@ from tauhat.dynamics.terms.inertia import INERTIAL_SYMBOLS, Inertia
 from tauhat.dynamics.terms.joint_term import JointTerm, ShapedTerm
 from tauhat.dynamics.terms.load import LoadCoulomb, LoadDahl
 from tauhat.dynamics.terms.presliding import Dahl
+from tauhat.dynamics.terms.shaped import Shaped
 from tauhat.dynamics.terms.shared_motors import Coupling, CouplingDahl
 from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
 from tauhat.dynamics.terms.term import Facts, Parameter, Term
@@ -40,6 +41,7 @@ __all__ = [
     "Parameter",
     "PolynomialFriction",
     "RotorInertia",
+    "Shaped",
     "ShapedTerm",
     "Spring",
     "Stribeck",

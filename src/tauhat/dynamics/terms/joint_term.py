@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.motion import Motion
+from tauhat.dynamics.terms.shaped import Shaped
 from tauhat.dynamics.terms.term import Facts, Parameter, Term
 from tauhat.errors import ModelError
 from tauhat.robots.joint import Joint
@@ -86,16 +86,9 @@ class JointTerm(Term):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ShapedTerm(JointTerm):
-    """A joint term whose columns depend non-linearly on one positive value a joint: a width, a speed, a length.
+class ShapedTerm(JointTerm, Shaped):
+    """A joint term whose columns depend non-linearly on one positive value a joint: a width, a speed, a length."""
 
-    Which value is right is told by the residual on the recordings that are fitted, joint by joint: the linear
-    parameters are solved inside (variable projection, Golub and Pereyra 1973), only the shape is searched, first on
-    `grid`, then around the best value of it.
-    """
-
-    shape_field: ClassVar[str]
-    grid: ClassVar[tuple[float, ...]]
     grid_of_speed: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -105,16 +98,9 @@ class ShapedTerm(JointTerm):
         if any(not 0.0 < value < np.inf for value in values):
             raise ModelError(f"term {self.key}: the {self.shape_field} must be positive", got=values)
 
-    @property
-    def shape(self) -> tuple[float, ...]:
-        """The shape of each joint, (n_v,); empty until chosen."""
-        values: tuple[float, ...] = getattr(self, self.shape_field)
-        return values
-
-    def with_shape(self, values: Sequence[float]) -> Self:
-        """Return the term with these shapes."""
-        changes: dict[str, Any] = {self.shape_field: tuple(float(value) for value in values)}
-        return replace(self, **changes)
+    def shaping(self, robot: Robot) -> IntArray:
+        """Return each parameter's joint: the values are one a joint, (n_v,)."""
+        return np.repeat(self.present(robot), len(self.symbols))
 
     def chosen(self, n_v: int, typical: float) -> FloatArray:
         """Return the shapes as a column, (n_v, 1); `typical` where none was chosen yet.
@@ -138,8 +124,3 @@ class ShapedTerm(JointTerm):
             return (self,)
         moving = facts.top_speeds if self.grid_of_speed else np.ones_like(facts.top_speeds)
         return tuple(self.with_shape([part * (top or 1.0) for top in moving]) for part in self.grid)
-
-    def mixed(self, forms: Sequence[Term], picks: Sequence[int]) -> Term:
-        """Return the term whose shape on joint j is that of `forms[picks[j]]`."""
-        shapes = [form.shape for form in forms if isinstance(form, ShapedTerm)]
-        return self.with_shape([shapes[pick][joint] for joint, pick in enumerate(picks)])

@@ -12,14 +12,15 @@ dynamics", 2013 (Staubli TX40, there with r = 1).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.motion import Motion
 from tauhat.dynamics.terms.friction import per_speed
-from tauhat.dynamics.terms.presliding import LENGTHS, dahl_states
+from tauhat.dynamics.terms.presliding import LENGTHS, SCALES, dahl_states
+from tauhat.dynamics.terms.shaped import Shaped
 from tauhat.dynamics.terms.term import Facts, Parameter, Term
 from tauhat.errors import ModelError
 from tauhat.robots.robot import Robot
@@ -52,7 +53,17 @@ class Coupling(Term):
             raise ModelError(f"term {self.key}: the widths must be positive", got=self.widths)
 
     def candidates(self, facts: Facts) -> tuple[Term, ...]:
-        """Return the term with the motors that the map tells, and widths for them."""
+        """Return the one form there is: that with the motors that the map tells, and widths for them."""
+        return (self.informed(facts),)
+
+    def informed(self, facts: Facts) -> Self:
+        """Return the term with the motors that the map tells, and widths for them.
+
+        Raises
+        ------
+        ModelError
+            when neither the term nor the map tells a motor.
+        """
         term = self if self.motors else replace(self, motors=facts.shared_motors)
         if not term.motors:
             raise ModelError(
@@ -60,9 +71,9 @@ class Coupling(Term):
                 remedy="give the map's [coupling] section, or leave the term out",
             )
         if term.widths:
-            return (term,)
+            return term
         tops = [facts.top_speeds[m.own] + abs(m.ratio) * facts.top_speeds[m.other] for m in term.motors]
-        return (replace(term, widths=tuple(_WIDTH * (top or 1.0) for top in tops)),)
+        return replace(term, widths=tuple(_WIDTH * (top or 1.0) for top in tops))
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Return inertia, viscous friction and dry friction of each shared motor."""
@@ -120,13 +131,41 @@ class Coupling(Term):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CouplingDahl(Coupling):
-    """The same with pre-sliding friction of two lengths in the place of the sign."""
+class CouplingDahl(Coupling, Shaped):
+    """The same with pre-sliding friction of two lengths in the place of the sign.
+
+    scales : of the two lengths, per motor; empty until chosen, and then one
+    """
 
     key: ClassVar[str] = "coupling-dahl"
     stateful: ClassVar[bool] = True
     stands_for: ClassVar[tuple[str, ...]] = ("coupling",)
     frictions: ClassVar[tuple[str, ...]] = ("Fdm", "Fem")
+    shape_field: ClassVar[str] = "scales"
+    grid: ClassVar[tuple[float, ...]] = SCALES
+    scales: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        super(CouplingDahl, self).__post_init__()
+        object.__setattr__(self, "scales", tuple(float(scale) for scale in self.scales))
+        if any(not 0.0 < scale < np.inf for scale in self.scales):
+            raise ModelError(f"term {self.key}: the scales must be positive", got=self.scales)
+
+    def candidates(self, facts: Facts) -> tuple[Term, ...]:
+        """Return the term with the motors that the map tells and each scale of the grid; given scales stay."""
+        term = self.informed(facts)
+        if term.scales:
+            return (term,)
+        return tuple(term.with_shape([scale] * len(term.motors)) for scale in self.grid)
+
+    def shaping(self, robot: Robot) -> IntArray:
+        """Return each parameter's motor, -1 for those whose columns no scale shapes."""
+        count = 2 + len(self.frictions)
+        places = np.repeat(np.arange(len(self.motors)), count)
+        return np.where(np.arange(places.size) % count < 2, -1, places)
 
     def _dry(self, motion: Motion, state: FloatArray | None) -> tuple[FloatArray, FloatArray | None]:
-        return dahl_states(self._along(motion.q), np.tile(LENGTHS, (len(self.motors), 1)), state)
+        scales = np.array(self.scales) if self.scales else np.ones(len(self.motors))
+        if scales.size != len(self.motors):
+            raise ModelError(f"term {self.key}: scales", expected=f"{len(self.motors)} values", got=scales.size)
+        return dahl_states(self._along(motion.q), np.outer(scales, LENGTHS), state)

@@ -8,7 +8,6 @@ stretch of a recording to the next) or iterated (they depend on the rigid-body p
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -96,19 +95,13 @@ class Term(ABC):
             f"the columns of term {self.key} have no gradient", remedy="leave it out of the motion's design"
         )
 
+    def informed(self, facts: Facts) -> Term:
+        """Return the term with what needs no fit: all but its shape."""
+        return self
+
     def candidates(self, facts: Facts) -> tuple[Term, ...]:
         """Return the forms of the term among which the fit on the recordings decides; most terms have one."""
         return (self,)
-
-    def mixed(self, forms: Sequence[Term], picks: Sequence[int]) -> Term:
-        """Return the term whose shape on joint j is that of `forms[picks[j]]`.
-
-        Raises
-        ------
-        ModelError
-            when the term has no shape.
-        """
-        raise ModelError(f"term {self.key} has no shape to choose")
 
     def after(self, inertia: FloatArray, rotors: FloatArray | None = None) -> Term:
         """Return the term for the next pass, given the rigid-body parameters that the last one found.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from tauhat.simulation.laws.bristle_kernel import add_bent, bend
@@ -85,7 +86,11 @@ def _add_bent_or_loaded(kind, v, z, joints):  # type: ignore[no-untyped-def]
     if kind == BRISTLES:
         add_bent(v[0:2], z, joints.torque)
     elif kind == LOADED_COULOMB:
-        add_smooth_sign(joints.dq, v[0] * joints.load, v[1], joints.torque, joints.damping)
+        for j in range(joints.dq.size):
+            s = np.tanh(joints.dq[j] / v[1, j])
+            peak = v[0, j] * joints.load[j]
+            joints.torque[j] += peak * s
+            joints.damping[j] += peak / v[1, j] * (1.0 - s * s)
     else:
         for j in range(joints.dq.size):
             joints.torque[j] += v[0, j] * joints.load[j] * z[0, j]
