@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sample_arms import chain, random_states
 from tauhat.dynamics import Motion, TorqueModel, base_parameters, motion_from_rows, torque_model
 from tauhat.dynamics.terms import Coupling, CouplingDahl, Facts, Inertia, RotorInertia, Viscous
-from tauhat.dynamics.terms.presliding import LENGTHS, dahl_states
+from tauhat.dynamics.terms.presliding import LENGTHS, SCALES, dahl_states
 from tauhat.errors import ModelError
 from tauhat.robots.shared_motor import SharedMotor
 
@@ -63,6 +63,38 @@ def test_presliding_follows_the_motors_own_path() -> None:
     found = torque(term, {"Fdm": 3.0, "Fem": 0.5}, motion)
     assert np.allclose(found[2], 3.0 * fine + 0.5 * coarse, rtol=0, atol=1e-12)
     assert np.allclose(found[1], -2.0 * found[2], rtol=0, atol=1e-12)
+
+
+def test_each_motors_scale_stretches_its_own_lengths() -> None:
+    q = 0.003 * np.cumsum(np.random.default_rng(0).normal(size=(3, 60)), axis=1)
+    motion = Motion(q=q, dq=np.zeros_like(q), ddq=np.zeros_like(q))
+    motors = ((2, 1, 1.0), (1, 0, 1.0))
+    columns, _ = CouplingDahl(motors=motors, scales=(3.0, 0.5)).columns(WRIST, motion, None)
+    for own, other, scale, rows in ((2, 1, 3.0, columns[2][2:4]), (1, 0, 0.5, columns[0][2:4])):
+        bent = dahl_states((q[own] + q[other])[None], scale * np.array([LENGTHS]), None)[0][0]
+        assert np.allclose(rows, bent, rtol=0, atol=1e-12)
+    plain = CouplingDahl(motors=motors).columns(WRIST, motion, None)[0]
+    ones = CouplingDahl(motors=motors, scales=(1.0, 1.0)).columns(WRIST, motion, None)[0]
+    assert all(np.array_equal(a, b) for a, b in zip(plain, ones, strict=True))
+
+
+def test_scales_are_open_until_given_and_shape_dry_friction_alone() -> None:
+    facts = Facts(np.ones(3), (SharedMotor(2, 1, 1.0),))
+    forms = CouplingDahl().candidates(facts)
+    assert [form.shape for form in forms] == [(scale,) for scale in SCALES]
+    assert {form.motors for form in forms} == {facts.shared_motors}
+    assert CouplingDahl().informed(facts).shape == ()
+    given_scale = CouplingDahl(motors=((2, 1, 1.0),), widths=(0.1,), scales=(2.0,))
+    assert given_scale.candidates(facts) == (given_scale,)
+    pair = CouplingDahl(motors=((2, 1, 1.0), (1, 0, 2.0)), scales=(1.0, 2.0))
+    assert pair.shaping(WRIST).tolist() == [-1, -1, 0, 0, -1, -1, 1, 1]
+    assert pair.shaped_joints(WRIST) == {0: 2, 1: 1}
+
+
+@pytest.mark.parametrize(("scales", "match"), [((0.0,), "must be positive"), ((1.0, 1.0), "expected 1 values, got 2")])
+def test_scales_must_fit_the_motors(scales: tuple[float, ...], match: str) -> None:
+    with pytest.raises(ModelError, match=match):
+        CouplingDahl(motors=((2, 1, 1.0),), scales=scales).columns(WRIST, MOTION, None)
 
 
 @given(cuts=st.lists(st.integers(1, 39), max_size=4, unique=True))

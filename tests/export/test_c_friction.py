@@ -70,7 +70,8 @@ def test_every_term_of_the_moment_is_the_models_own(tmp_path, term):
 
 
 @pytest.mark.parametrize("term", [Dahl(scales=(0.5, 1.0, 2.0, 1.5)), LoadDahl(inertia=other_inertia(arm())), LoadDahl(),
-                                  CouplingDahl(motors=MOTORS)], ids=lambda term: term.key)  # fmt: skip
+                                  CouplingDahl(motors=MOTORS), CouplingDahl(motors=MOTORS, scales=(0.5, 3.0))],
+                         ids=lambda term: term.key)  # fmt: skip
 def test_every_term_with_a_memory_is_exact_step_by_step(tmp_path, term):
     model = model_with(term)
     standard, parameters = parameters_of(model)

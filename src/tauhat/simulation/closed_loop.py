@@ -19,6 +19,7 @@ from tauhat.control.controller import Controller, ControlSample, TrackingControl
 from tauhat.control.laws import TrackingLaw
 from tauhat.errors import SimulationError
 from tauhat.excitation.trajectory import MotionSamples
+from tauhat.simulation import rows as r
 from tauhat.simulation.laws.law import Side
 from tauhat.simulation.loop_kernel import FINE, run_loop
 from tauhat.simulation.plant import Plant, plant_gravity_torque, plant_torque
@@ -117,20 +118,15 @@ class Course:
 
 
 class _Steering(NamedTuple):
-    """A tracking law in the kernel; `seen`, `integral` and `queue` change."""
+    """A tracking law in the kernel; `queue` and some of the rows change."""
 
-    kp: FloatArray
-    kd: FloatArray
-    ki: FloatArray
-    limit: FloatArray
-    encoder_step: FloatArray
+    rows: FloatArray
     on_motor: bool
     differenced: bool
     period: float
     substeps: int
-    seen: FloatArray
-    integral: FloatArray
     queue: FloatArray
+    unlogged: FloatArray
 
 
 class _Reference(NamedTuple):
@@ -174,23 +170,21 @@ def _follow_in_kernel(
     log: FloatArray,
 ) -> None:
     n_v = running.plant.robot.n_v
+    rows = np.zeros((r.STEERING_ROWS, n_v))
+    rows[r.KP], rows[r.KD], rows[r.KI], rows[r.LIMIT] = law.kp, law.kd, law.integral_gain, law.torque_limit
+    rows[r.ENCODER_STEP] = pilot.encoder.steps(n_v)
     steering = _Steering(
-        kp=law.kp,
-        kd=law.kd,
-        ki=law.integral_gain,
-        limit=law.torque_limit,
-        encoder_step=pilot.encoder.steps(n_v),
+        rows=rows,
         on_motor=pilot.encoder.side == "motor",
         differenced=pilot.encoder.velocity == "differenced",
         period=course.period,
         substeps=course.substeps,
-        seen=np.zeros((2, n_v)),
-        integral=np.zeros(n_v),
         queue=np.tile(_clipped(feedforward[0], law.torque_limit), (pilot.delayed, 1)),
+        unlogged=np.empty(log.shape[1:]),
     )
     motion = course.reference
     reference = _Reference(motion.q, motion.dq, feedforward, course.settle, course.stride, _RUNAWAY)
-    failed = run_loop(running.machine, running.memory, steering, reference, log)
+    failed = run_loop(running.machine, running.memory.rows, running.memory.memory, steering, reference, log)
     if failed != FINE:
         raise _runaway(running, (failed - course.settle) * course.period)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tauhat.arrays import FloatArray, read_only
+from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.control.controller import Controller
 from tauhat.control.laws import TrackingLaw
 from tauhat.errors import SimulationError, TauhatWarning
@@ -21,7 +21,7 @@ from tauhat.simulation.laws import SharedDrive
 from tauhat.simulation.parameters import TrueParameters
 from tauhat.simulation.plant import build_plant
 from tauhat.simulation.running import CHANNELS, started
-from tauhat.simulation.sensors import SensorErrors, measure
+from tauhat.simulation.sensors import SensorErrors, Signals, measure
 
 _WHOLE = 1e-6  # how far a ratio of rates may be from a whole number
 
@@ -82,7 +82,7 @@ class ExperimentSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Truth:
-    """What the sensors cannot show, at the samples of the recording; (n_t, n_v) arrays.
+    """What the sensors cannot show, at the ticks of the log's clock; (n_t, n_v) arrays.
 
     At every sample, to rounding,
 
@@ -125,10 +125,14 @@ class Truth:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Simulation:
-    """A recording as a robot would log it, with its truth."""
+    """A recording as a robot would log it, with its truth.
+
+    rows : (n,) sample of the truth that each row of the recording was taken at: all, unless samples were lost
+    """
 
     recording: Recording
     truth: Truth
+    rows: IntArray
 
 
 def simulate(
@@ -144,8 +148,8 @@ def simulate(
 
     By default a PD controller with the nominal robot's gravity at the reference as feedforward acts on the true state.
     Recording and truth share one clock that starts with the motion: sample k is the state at t_k and the torque the
-    motor starts to deliver at t_k. The recording's position is that of the encoder: with `encoder.side = "motor"` and
-    elastic joints, the motor's.
+    motor starts to deliver at t_k; sensors may read it late, stamp it wrongly or lose it. The recording's position is
+    that of the encoder: with `encoder.side = "motor"` and elastic joints, the motor's.
 
     Parameters
     ----------
@@ -173,7 +177,38 @@ def simulate(
     truth = Truth(
         parameters=plant.parameters, reference=motion.sample(t), **{name: read_only(log[name]) for name in log}
     )
-    return Simulation(recording=_recording(robot, truth, settings, rng), truth=truth)
+    return logged(robot, truth, settings=settings, rng=rng)
+
+
+def logged(robot: Robot, truth: Truth, *, settings: ExperimentSettings, rng: np.random.Generator) -> Simulation:
+    """Return the log that the sensors of these settings make of a run: another one of the same run, where it has one.
+
+    Parameters
+    ----------
+    settings : their sensors, and the side of their encoder
+    rng : of the sensor noise
+    """
+    on_motor = settings.encoder.side == "motor"
+    signals = Signals(
+        t=truth.reference.t,
+        q=truth.motor_q if on_motor else truth.q,
+        dq=truth.motor_dq if on_motor else truth.dq,
+        tau=truth.gear_torque if settings.sensors.torque_side == "link" else truth.tau,
+        link=truth.q,
+        motor=truth.motor_q,
+    )
+    shown = measure(settings.sensors, signals, rng=rng)
+    recording = Recording(
+        t=shown.t,
+        q=shown.q,
+        dq=shown.dq,
+        tau=shown.tau,
+        temperature=None if truth.parameters.heat is None else truth.temperature[shown.rows],
+        joint_names=robot.joint_names,
+        name=f"{robot.name} simulated",
+        shared_motors=_shared_motors(truth.parameters),
+    )
+    return Simulation(recording=recording, truth=truth, rows=shown.rows)
 
 
 def _course(robot: Robot, motion: Trajectory, settings: ExperimentSettings) -> Course:
@@ -193,22 +228,6 @@ def _pilot(robot: Robot, course: Course, settings: ExperimentSettings) -> Pilot:
         robot, course.reference.q, bandwidth=settings.bandwidth, control_rate=settings.control_rate
     )
     return Pilot(controller=law, encoder=settings.encoder, delayed=settings.delayed)
-
-
-def _recording(robot: Robot, truth: Truth, settings: ExperimentSettings, rng: np.random.Generator) -> Recording:
-    """Return the truth as the sensors show it."""
-    side = (truth.motor_q, truth.motor_dq) if settings.encoder.side == "motor" else (truth.q, truth.dq)
-    shown = measure(settings.sensors, *side, tau=truth.tau, rng=rng)
-    return Recording(
-        t=truth.reference.t,
-        q=shown.q,
-        dq=shown.dq,
-        tau=shown.tau,
-        temperature=None if truth.parameters.heat is None else truth.temperature,
-        joint_names=robot.joint_names,
-        name=f"{robot.name} simulated",
-        shared_motors=_shared_motors(truth.parameters),
-    )
 
 
 def _shared_motors(parameters: TrueParameters) -> tuple[SharedMotor, ...]:

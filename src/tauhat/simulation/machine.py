@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tauhat.arrays import FloatArray, IntArray
+from tauhat.arrays import FloatArray, IntArray, read_only
+from tauhat.simulation import rows as r
 from tauhat.simulation.laws import SharedDrive
-from tauhat.simulation.laws.law import JointState, resting_state
 from tauhat.simulation.laws.program import Program, compiled, initial_memory
 from tauhat.simulation.native import NativeFunctions
 from tauhat.simulation.parameters import TrueParameters
@@ -39,43 +39,71 @@ class Engine(NamedTuple):
 
 
 class Drives(NamedTuple):
-    """Constants of the drives, (n_v,) each.
+    """Constants of the drives.
 
     timestep : [s]
     elastic : whether any joint is
-    offset, viscous, coulomb, rotor : as in `TrueParameters`
-    stiffness, spring_damping, half_gap : of elastic transmissions; a stiffness of zero marks a rigid joint
-    shared : (n_v, n_v) inertia of motors that turn with two joints
+    rows : (SHARED + n_v, n_v), of which the properties are views
     """
 
     timestep: float
     elastic: bool
-    offset: FloatArray
-    viscous: FloatArray
-    coulomb: FloatArray
-    rotor: FloatArray
-    stiffness: FloatArray
-    spring_damping: FloatArray
-    half_gap: FloatArray
-    shared: FloatArray
+    rows: FloatArray
+
+    @property
+    def offset(self) -> FloatArray:
+        """As in `TrueParameters`, like the three below."""
+        return np.asarray(self.rows[r.OFFSET])
+
+    @property
+    def viscous(self) -> FloatArray:
+        """Of the plant's own friction."""
+        return np.asarray(self.rows[r.OWN_VISCOUS])
+
+    @property
+    def coulomb(self) -> FloatArray:
+        """Of the plant's own friction."""
+        return np.asarray(self.rows[r.OWN_COULOMB])
+
+    @property
+    def rotor(self) -> FloatArray:
+        """Inertia of the rotors."""
+        return np.asarray(self.rows[r.ROTOR])
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Of elastic transmissions; zero marks a rigid joint."""
+        return np.asarray(self.rows[r.STIFFNESS])
+
+    @property
+    def spring_damping(self) -> FloatArray:
+        """Of elastic transmissions."""
+        return np.asarray(self.rows[r.SPRING_DAMPING])
+
+    @property
+    def half_gap(self) -> FloatArray:
+        """Of elastic transmissions."""
+        return np.asarray(self.rows[r.HALF_GAP])
+
+    @property
+    def shared(self) -> FloatArray:
+        """Inertia of motors that turn with two joints, (n_v, n_v)."""
+        return np.asarray(self.rows[r.SHARED :])
 
 
 class Warming(NamedTuple):
     """Constants of the thermal states.
 
-    active : whether friction depends on temperature at all
+    active : whether temperatures change at all
     ambient, reference : [deg C]
-    decay : (n_v,) what is left of a difference of temperature after a step
-    rise : (n_v,) [K/J]
-    slopes : (2 + n_laws, n_v) relative change of viscous, Coulomb and the laws' friction [1/K]
+    rows : what is left of a difference of temperature after a step; rise [K/J]; and relative changes of viscous,
+        Coulomb and the laws' friction [1/K]
     """
 
     active: bool
     ambient: float
     reference: float
-    decay: FloatArray
-    rise: FloatArray
-    slopes: FloatArray
+    rows: FloatArray
 
 
 class Machine(NamedTuple):
@@ -88,73 +116,69 @@ class Machine(NamedTuple):
 
 
 class MachineState(NamedTuple):
-    """What changes, (n_v,) each; from `q` on it is what the last step found at its begin.
+    """What changes.
 
-    shaft, shaft_dq : where the motors are now, on the joint side; the joints' own position where they are rigid
+    rows : (STATE_ROWS, n_v): see `rows`
     memory : (n_rows, n_v) of the laws
-    load : size of the rigid-body torque through the gear
-    temperature : [deg C]
-    external : torque that the environment adds, held until it is set again
-    q, dq, ddq, motor, motor_dq, motor_ddq : motion of the links and of the motors
-    dry, law, gear : torque of ideal dry friction, of everything passive beside it, and through the gear
-    friction, slope, spring : of friction laws with its derivative by speed, and of springs
-    single : one joint, scratch
-    work : (8, n_v) scratch
     """
 
-    shaft: FloatArray
-    shaft_dq: FloatArray
+    rows: FloatArray
     memory: FloatArray
-    load: FloatArray
-    temperature: FloatArray
-    external: FloatArray
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
-    motor: FloatArray
-    motor_dq: FloatArray
-    motor_ddq: FloatArray
-    dry: FloatArray
-    law: FloatArray
-    gear: FloatArray
-    friction: FloatArray
-    slope: FloatArray
-    spring: FloatArray
-    single: JointState
-    work: FloatArray
+
+    @property
+    def shaft(self) -> FloatArray:
+        """Where the motors are now, on the joint side; the joints' own position where they are rigid."""
+        return np.asarray(self.rows[r.SHAFT])
+
+    @property
+    def shaft_dq(self) -> FloatArray:
+        """How fast the motors turn now."""
+        return np.asarray(self.rows[r.SHAFT_DQ])
+
+    @property
+    def load(self) -> FloatArray:
+        """Size of the rigid-body torque through the gear."""
+        return np.asarray(self.rows[r.LOAD])
+
+    @property
+    def temperature(self) -> FloatArray:
+        """Temperature now [deg C]."""
+        return np.asarray(self.rows[r.WARMTH])
+
+    @property
+    def pushed(self) -> FloatArray:
+        """Torque that the environment adds, held until it is set again."""
+        return np.asarray(self.rows[r.PUSHED])
 
 
 def drives_of(truth: TrueParameters, timestep: float) -> Drives:
     """Return the constants of the drives."""
     n_v, elastic = truth.n_v, truth.elasticity
-    inertias = [law.inertia_matrix(n_v) for law in truth.laws if isinstance(law, SharedDrive)]
-    rigid = np.zeros(n_v)
-    return Drives(
-        timestep=timestep,
-        elastic=elastic is not None,
-        offset=truth.offset,
-        viscous=truth.viscous,
-        coulomb=truth.coulomb,
-        rotor=truth.rotor,
-        stiffness=rigid if elastic is None else elastic.spread(elastic.stiffness, n_v),
-        spring_damping=rigid if elastic is None else elastic.spread(elastic.damping, n_v),
-        half_gap=rigid if elastic is None else elastic.spread(0.5 * elastic.gap, n_v),
-        shared=np.sum(inertias, axis=0) if inertias else np.zeros((n_v, n_v)),
-    )
+    rows = np.zeros((r.SHARED + n_v, n_v))
+    rows[r.OFFSET], rows[r.OWN_VISCOUS], rows[r.OWN_COULOMB] = truth.offset, truth.viscous, truth.coulomb
+    rows[r.ROTOR] = truth.rotor
+    if elastic is not None:
+        rows[r.STIFFNESS] = elastic.spread(elastic.stiffness, n_v)
+        rows[r.SPRING_DAMPING] = elastic.spread(elastic.damping, n_v)
+        rows[r.HALF_GAP] = elastic.spread(0.5 * elastic.gap, n_v)
+    for law in truth.laws:
+        if isinstance(law, SharedDrive):
+            rows[r.SHARED :] += law.inertia_matrix(n_v)
+    return Drives(timestep, elastic is not None, np.asarray(read_only(rows)))
 
 
 def warming_of(truth: TrueParameters, timestep: float) -> Warming:
     """Return the constants of the thermal states, which stay put and change nothing where the truth has none."""
-    n_v, heat = truth.n_v, truth.heat
-    slopes = np.zeros((2 + len(truth.laws), n_v))
+    heat = truth.heat
+    rows = np.zeros((r.SLOPES + 2 + len(truth.laws), truth.n_v))
     if heat is None:
-        return Warming(False, 0.0, 0.0, np.ones(n_v), np.zeros(n_v), slopes)
-    slopes[0], slopes[1] = heat.viscous, heat.coulomb
-    slopes[2 : 2 + len(heat.laws)] = heat.laws
-    decay = np.exp(-timestep / heat.time_constant)
+        return Warming(False, 0.0, 0.0, np.asarray(read_only(rows)))
+    rows[r.DECAY] = np.exp(-timestep / heat.time_constant)
     # A step's heat arrives evenly over the step and cools while it does.
-    rise = heat.heating * (1.0 - decay) * heat.time_constant / timestep
-    return Warming(True, heat.ambient, heat.reference, decay, rise, slopes)
+    rows[r.RISE] = heat.heating * (1.0 - rows[r.DECAY]) * heat.time_constant / timestep
+    rows[r.SLOPES], rows[r.SLOPES + 1] = heat.viscous, heat.coulomb
+    rows[r.SLOPES + 2 : r.SLOPES + 2 + len(heat.laws)] = heat.laws
+    return Warming(True, heat.ambient, heat.reference, np.asarray(read_only(rows)))
 
 
 def engine_of(model: Any, data: Any, dof: IntArray, native: NativeFunctions | None) -> Engine:
@@ -185,10 +209,7 @@ def machine_of(truth: TrueParameters, engine: Engine, timestep: float) -> Machin
 
 def machine_state(truth: TrueParameters) -> MachineState:
     """Return a state of rest at position zero."""
-    n_v = truth.n_v
-    rows = {name: np.zeros(n_v) for name in MachineState._fields if name not in {"memory", "single", "work"}}
+    state = MachineState(np.zeros((r.STATE_ROWS, truth.n_v)), initial_memory(truth.laws, truth.n_v))
     if truth.heat is not None:
-        rows["temperature"][:] = truth.heat.initial
-    return MachineState(
-        **rows, memory=initial_memory(truth.laws, n_v), single=resting_state(1), work=np.zeros((8, n_v))
-    )
+        state.temperature[:] = truth.heat.initial
+    return state

@@ -14,6 +14,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.errors import SimulationError
+from tauhat.simulation import rows as r
 from tauhat.simulation.laws.law import resting_state
 from tauhat.simulation.laws.program import parts_of_memory
 from tauhat.simulation.loop_kernel import pass_period
@@ -104,28 +105,25 @@ class RunningPlant:
 
     def push(self, torque: FloatArray) -> None:
         """Let the environment add a torque (n_v,) to the links, until it is set again [Nm or N]."""
-        self.memory.external[:] = torque
+        self.memory.pushed[:] = torque
 
     def advance(self, tau: FloatArray, steps: int = 1) -> Reaction:
         """Pass `steps` steps of time under the motor torque (n_v,), and return the reaction at the first."""
-        record = np.empty((len(CHANNELS), self.plant.robot.n_v))
-        tau = np.ascontiguousarray(tau, dtype=np.float64)
+        x = self.memory.rows
+        record = np.empty((len(CHANNELS), x.shape[1]))
+        x[r.TAU] = tau
         if self.native:
-            pass_period(self.machine, self.memory, tau, steps, record)
+            pass_period(self.machine, x, self.memory.memory, steps, record)
         else:
-            self._advance_in_python(tau, steps, record)
+            self._advance_in_python(steps, record)
         return Reaction(*record)
 
-    def _advance_in_python(self, tau: FloatArray, steps: int, record: FloatArray) -> None:
-        memory = self.memory
+    def _advance_in_python(self, steps: int, record: FloatArray) -> None:
+        x = self.memory.rows
         for step in range(steps):
-            warm = memory.temperature.copy()
-            reference_step(self.simulator, self.machine, memory, laws=self.laws, tau=tau)
+            reference_step(self.simulator, self.machine, x, self.laws)
             if step == 0:
-                record[:3], record[3] = (memory.q, memory.dq, memory.ddq), tau
-                record[4:6] = memory.dry, memory.law
-                record[6:9] = memory.motor, memory.motor_dq, memory.motor_ddq
-                record[9:] = memory.gear, warm, memory.external
+                record[:] = x[: len(CHANNELS)]
 
     def in_python(self) -> RunningPlant:
         """Return the same plant, stepped from Python."""
@@ -165,10 +163,8 @@ def started(plant: Plant, q: FloatArray) -> RunningPlant:
 
 def _bending(running: RunningPlant, gravity: FloatArray) -> FloatArray:
     """Return by how much the motors must be ahead of their links to hold them, (n_v,)."""
-    drives, memory = running.machine.drives, running.memory
-    memory.q[:], _ = running.state
-    joints = resting_state(gravity.size)
-    joints.q[:] = memory.q
+    drives, joints = running.machine.drives, resting_state(gravity.size)
+    joints.q[:], _ = running.state
     for law, part in running.laws:
         if law.side == "link":
             law.add(joints, part)

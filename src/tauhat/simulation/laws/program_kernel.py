@@ -10,6 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
+from tauhat.simulation import rows as r
 from tauhat.simulation.laws.bristle_kernel import add_bent, bend
 from tauhat.simulation.laws.speed_kernel import (
     add_by_direction,
@@ -31,41 +32,44 @@ def on_the_link(kind):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def add_law(program, i, memory, joints, single):  # type: ignore[no-untyped-def]
-    """Add law i at the state `joints`; `single` is a state of one joint, to work in."""
+def add_law(program, i, memory, x):  # type: ignore[no-untyped-def]
+    """Add law i to the rows PART and PART_SLOPE of the state x, at the joints that the rows SEEN describe."""
     kind = program.kinds[i]
     v = program.values[program.first[i] : program.first[i + 1]]
     z = memory[program.remembered[i] : program.remembered[i + 1]]
     if kind == SPRING:
-        _add_spring(v, joints)
+        for j in range(x.shape[1]):
+            x[r.PART, j] += v[0, j] * x[r.SEEN, j]
     if kind == GAS_CYLINDER:
-        _add_cylinder(v, joints)
+        _add_cylinder(v, x)
     if kind in (SHARED_SMOOTH, SHARED_BRISTLES):
-        _add_shared(kind, v, z, joints, single)
-    if kind in (BRISTLES, LOADED_COULOMB, LOADED_BRISTLES):
-        _add_bent_or_loaded(kind, v, z, joints)
+        _add_shared(kind, v, z, x)
+    if kind == BRISTLES:
+        add_bent(v[0:2], z, x[r.PART])
+    if kind in (LOADED_COULOMB, LOADED_BRISTLES):
+        _add_loaded(kind, v, z, x)
     if kind <= POLYNOMIAL:
-        _add_by_speed(kind, v, joints)
+        _add_by_speed(kind, v, x[r.SEEN_DQ], x[r.PART], x[r.PART_SLOPE])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def advance_law(program, i, memory, moved, single):  # type: ignore[no-untyped-def]
-    """Carry the memory of law i along the displacements moved (n_v,)."""
+def advance_law(program, i, memory, x):  # type: ignore[no-untyped-def]
+    """Carry the memory of law i along the displacements in the row MOVED of the state."""
     kind = program.kinds[i]
     v = program.values[program.first[i] : program.first[i + 1]]
     z = memory[program.remembered[i] : program.remembered[i + 1]]
+    moved = x[r.MOVED]
     if kind == BRISTLES:
         bend(moved, v[2:4], z)
-    elif kind == LOADED_BRISTLES:
+    if kind == LOADED_BRISTLES:
         bend(moved, v[1:2], z)
-    elif kind == SHARED_BRISTLES:
-        single.q[0] = moved[int(v[0, 0])] + v[2, 0] * moved[int(v[1, 0])]
-        bend(single.q, v[6:8], z)
+    if kind == SHARED_BRISTLES:
+        x[r.SINGLE, 0] = moved[int(v[0, 0])] + v[2, 0] * moved[int(v[1, 0])]
+        bend(x[r.SINGLE, 0:1], v[6:8], z)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_by_speed(kind, v, joints):  # type: ignore[no-untyped-def]
-    dq, torque, damping = joints.dq, joints.torque, joints.damping
+def _add_by_speed(kind, v, dq, torque, damping):  # type: ignore[no-untyped-def]
     if kind == SMOOTH_COULOMB:
         add_smooth_sign(dq, v[0], v[1], torque, damping)
     if kind == CUBE_ROOT:
@@ -82,51 +86,42 @@ def _add_by_speed(kind, v, joints):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_bent_or_loaded(kind, v, z, joints):  # type: ignore[no-untyped-def]
-    if kind == BRISTLES:
-        add_bent(v[0:2], z, joints.torque)
-    elif kind == LOADED_COULOMB:
-        for j in range(joints.dq.size):
-            s = np.tanh(joints.dq[j] / v[1, j])
-            peak = v[0, j] * joints.load[j]
-            joints.torque[j] += peak * s
-            joints.damping[j] += peak / v[1, j] * (1.0 - s * s)
-    else:
-        for j in range(joints.dq.size):
-            joints.torque[j] += v[0, j] * joints.load[j] * z[0, j]
+def _add_loaded(kind, v, z, x):  # type: ignore[no-untyped-def]
+    for j in range(x.shape[1]):
+        peak = v[0, j] * x[r.SEEN_LOAD, j]
+        if kind == LOADED_COULOMB:
+            s = np.tanh(x[r.SEEN_DQ, j] / v[1, j])
+            x[r.PART, j] += peak * s
+            x[r.PART_SLOPE, j] += peak / v[1, j] * (1.0 - s * s)
+        else:
+            x[r.PART, j] += peak * z[0, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_shared(kind, v, z, joints, single):  # type: ignore[no-untyped-def]
+def _add_shared(kind, v, z, x):  # type: ignore[no-untyped-def]
     """Add the friction of a motor that turns with two joints, `q_m = q[own] + ratio q[other]`."""
     own, other, ratio, viscous = int(v[0, 0]), int(v[1, 0]), v[2, 0], v[3, 0]
-    single.dq[0] = joints.dq[own] + ratio * joints.dq[other]
-    single.torque[0] = viscous * single.dq[0]
-    single.damping[0] = viscous
+    dq, torque, damping = x[r.SINGLE + 1, 0:1], x[r.SINGLE + 3, 0:1], x[r.SINGLE + 4, 0:1]
+    dq[0] = x[r.SEEN_DQ, own] + ratio * x[r.SEEN_DQ, other]
+    torque[0], damping[0] = viscous * dq[0], viscous
     if kind == SHARED_SMOOTH:
-        add_smooth_sign(single.dq, v[4], v[5], single.torque, single.damping)
+        add_smooth_sign(dq, v[4], v[5], torque, damping)
     else:
         for i in range(z.shape[0]):
-            single.torque[0] += v[4 + i, 0] * z[i, 0]
-    joints.torque[own] += single.torque[0]
-    joints.torque[other] += ratio * single.torque[0]
+            torque[0] += v[4 + i, 0] * z[i, 0]
+    x[r.PART, own] += torque[0]
+    x[r.PART, other] += ratio * torque[0]
     arm = abs(ratio)
-    joints.damping[own] += (1.0 + arm) * single.damping[0]
-    joints.damping[other] += (arm + arm**2) * single.damping[0]
+    x[r.PART_SLOPE, own] += (1.0 + arm) * damping[0]
+    x[r.PART_SLOPE, other] += (arm + arm**2) * damping[0]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_spring(v, joints):  # type: ignore[no-untyped-def]
-    for j in range(joints.q.size):
-        joints.torque[j] += v[0, j] * joints.q[j]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _add_cylinder(v, joints):  # type: ignore[no-untyped-def]
+def _add_cylinder(v, x):  # type: ignore[no-untyped-def]
     """Add the torque of a gas cylinder, the derivative of `-energy ln(V)` by the joint's position."""
     j, energy, distance, lever = int(v[0, 0]), v[1, 0], v[2, 0], v[3, 0]
-    turned, area, volume = joints.q[j] + v[4, 0], v[5, 0], v[6, 0]
+    turned, area, volume = x[r.SEEN, j] + v[4, 0], v[5, 0], v[6, 0]
     length = math.hypot(distance - lever * math.cos(turned), lever * math.sin(turned))
     arm = distance * lever * math.sin(turned) / length
     left = volume - area * (length - distance + lever)
-    joints.torque[j] += energy / left * area * arm
+    x[r.PART, j] += energy / left * area * arm

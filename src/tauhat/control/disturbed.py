@@ -1,0 +1,131 @@
+"""A controller as a real one is: it sees noise, and it is stopped when the robot is lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, frozen
+from tauhat.control.controller import Controller, ControlSample
+from tauhat.control.laws import Feedforward
+from tauhat.errors import ArrayError, SimulationError
+
+
+class Counted(NamedTuple):
+    """Memory of a controller within, and how many steps have passed."""
+
+    inner: Any
+    steps: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NoisySight:
+    """A controller that sees position and speed with noise.
+
+    The noise is drawn beforehand and repeats after its last row, so that a step stays a pure function.
+
+    inner : the controller
+    position, speed : (n, n_v) added to what it sees [rad, rad/s] or [m, m/s]
+    """
+
+    inner: Controller
+    position: FloatArray
+    speed: FloatArray
+
+    def __post_init__(self) -> None:
+        position = frozen("position", self.position, (None, None), where="noisy sight")
+        if not len(position):
+            raise ArrayError("position is empty", where="noisy sight", expected="at least a row")
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "speed", frozen("speed", self.speed, position.shape, where="noisy sight"))
+
+    @property
+    def feedforward(self) -> Feedforward:
+        """The inner controller's."""
+        return self.inner.feedforward
+
+    @property
+    def torque_limit(self) -> FloatArray:
+        """The inner controller's."""
+        return self.inner.torque_limit
+
+    def start(self, sample: ControlSample) -> Counted:
+        """Return the inner controller's memory, and no step."""
+        return Counted(self.inner.start(self._seen(sample, 0)), 0)
+
+    def step(self, memory: Counted, sample: ControlSample) -> tuple[Counted, FloatArray]:
+        """Return the memory behind this step, and the inner controller's torque (n_v,) [Nm or N]."""
+        inner, torque = self.inner.step(memory.inner, self._seen(sample, memory.steps))
+        return Counted(inner, memory.steps + 1), torque
+
+    def _seen(self, sample: ControlSample, steps: int) -> ControlSample:
+        row = steps % len(self.position)
+        return sample._replace(q=sample.q + self.position[row], dq=sample.dq + self.speed[row])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Watched:
+    """A controller that gives up when a joint is farther from its reference than allowed.
+
+    inner : the controller
+    farthest : (n_v,) [rad or m]
+    """
+
+    inner: Controller
+    farthest: FloatArray
+
+    def __post_init__(self) -> None:
+        farthest = frozen("farthest", self.farthest, (None,), where="watched controller")
+        if not (farthest > 0.0).all():
+            raise ArrayError("farthest is not positive", where="watched controller", got=f"{farthest.min():g}")
+        object.__setattr__(self, "farthest", farthest)
+
+    @property
+    def feedforward(self) -> Feedforward:
+        """The inner controller's."""
+        return self.inner.feedforward
+
+    @property
+    def torque_limit(self) -> FloatArray:
+        """The inner controller's."""
+        return self.inner.torque_limit
+
+    def start(self, sample: ControlSample) -> Any:
+        """Return the inner controller's memory."""
+        return self.inner.start(sample)
+
+    def step(self, memory: Any, sample: ControlSample) -> tuple[Any, FloatArray]:
+        """Return the inner controller's memory and torque.
+
+        Raises
+        ------
+        SimulationError
+            when a joint is too far from its reference, or nowhere.
+        """
+        error = np.abs(sample.q - sample.q_ref)
+        if not (error <= self.farthest).all():
+            joint = int(np.argmax(np.where(np.isfinite(error), error / self.farthest, np.inf)))
+            raise SimulationError(
+                "the robot is lost",
+                where=f"joint {joint + 1}, t = {sample.t:.4g} s",
+                expected=f"within {self.farthest[joint]:g} of its reference",
+                got=f"{error[joint]:.3g}",
+                remedy="lower the gains, or start in the pose of the reference",
+            )
+        return self.inner.step(memory, sample)
+
+
+def noisy_sight(
+    inner: Controller, rng: np.random.Generator, *, rows: int, deviations: tuple[FloatArray, FloatArray]
+) -> NoisySight:
+    """Return the controller with white noise on what it sees.
+
+    Parameters
+    ----------
+    rows : steps before the noise repeats
+    deviations : standard deviations of position and speed, (n_v,) each
+    """
+    position, speed = (rng.standard_normal((rows, len(size))) * size for size in deviations)
+    return NoisySight(inner=inner, position=position, speed=speed)
