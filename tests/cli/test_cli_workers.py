@@ -5,8 +5,8 @@ from __future__ import annotations
 import socket
 
 import pytest
-
 from cli_workshop import made, run_tauhat
+
 from tauhat.estimation import load_estimate
 
 
@@ -26,7 +26,7 @@ def refusal(*words: object) -> str:
 
 
 def test_processes_that_read_the_logs_give_the_same_estimate(workshop, tmp_path):
-    words = ("identify", workshop.folder / "arm.urdf", workshop.log, workshop.other_log, "--rows", "100:1500")
+    words = ("identify", "two_link", workshop.log, workshop.other_log, "--rows", "10:900")
     made(*words, "-o", tmp_path / "here.json")
     made(*words, "-o", tmp_path / "there.json", "--workers", 1)
     here, there = (load_estimate(tmp_path / name).to_dict() for name in ("here.json", "there.json"))
@@ -34,7 +34,7 @@ def test_processes_that_read_the_logs_give_the_same_estimate(workshop, tmp_path)
 
 
 def test_what_workers_cannot_do_is_refused(workshop, tmp_path, nowhere):
-    words = ("identify", workshop.folder / "arm.urdf", workshop.log, "-o", tmp_path / "never.json")
+    words = ("identify", "two_link", workshop.log, "-o", tmp_path / "never.json")
     assert "irls reads every row" in refusal(*words, "--workers", 1, "--estimator", "irls")
     assert "--model auto" in refusal(*words, "--cluster", nowhere, "--model", "auto")
     assert "give one of the two" in refusal(*words, "--cluster", nowhere, "--workers", 2)
@@ -43,5 +43,5 @@ def test_what_workers_cannot_do_is_refused(workshop, tmp_path, nowhere):
 
 def test_a_cluster_that_is_not_there_is_named_in_one_line(workshop, tmp_path, nowhere):
     pytest.importorskip("distributed")
-    words = ("identify", workshop.folder / "arm.urdf", workshop.log, "-o", tmp_path / "never.json")
+    words = ("identify", "two_link", workshop.log, "-o", tmp_path / "never.json")
     assert f"{nowhere}: no Dask scheduler can be reached" in refusal(*words, "--cluster", nowhere)

@@ -20,12 +20,12 @@ from tauhat.recordings.writing import write_recording
 from tauhat.robots.robot import Robot
 from tauhat.simulation.experiment import ExperimentSettings, Simulation, simulate
 from tauhat.simulation.parameters import TrueParameters
+from tauhat.simulation.planned_experiment import MOST_SAMPLES
 from tauhat.simulation.sensors import SensorErrors
 from tauhat.simulation.truth_file import plant_document
 from tauhat.verification.truth import standard_parameters
 
 _SLOWEST_CONTROL = 2000.0  # [Hz]
-_MOST_SAMPLES = 5_000_000  # of one log: a few gigabytes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,9 +46,9 @@ class Plan:
     quantisation: float = 2e-5
 
     def __post_init__(self) -> None:
-        if self.seconds * self.rate > _MOST_SAMPLES:
+        if self.seconds * self.rate > MOST_SAMPLES:
             raise SimulationError(
-                "absurdly long log", expected=f"at most {_MOST_SAMPLES} samples",
+                "absurdly long log", expected=f"at most {MOST_SAMPLES} samples",
                 got=f"{self.seconds * self.rate:.0f}", remedy="choose a shorter motion or a lower rate",
             )  # fmt: skip
 
@@ -86,9 +86,20 @@ def write_experiment(robot: Robot, simulation: Simulation, log: Path, *, plan: P
     OutputError
         when one of them cannot be written.
     """
+    return write_log(robot, simulation, log, notes={"plan": asdict(plan), "seed": seed})
+
+
+def write_log(robot: Robot, simulation: Simulation, log: Path, *, notes: dict[str, Any]) -> Path:
+    """Write the log, and its true parameters with the notes beside it; return the path of the latter.
+
+    Raises
+    ------
+    OutputError
+        when one of them cannot be written.
+    """
     write_recording(simulation.recording, log)
     beside = truth_path(log)
-    document = truth_document(robot, simulation.truth.parameters) | {"plan": asdict(plan), "seed": seed}
+    document = truth_document(robot, simulation.truth.parameters) | notes
     write_text(beside, json.dumps(document, indent=1, allow_nan=False))
     return beside
 

@@ -12,6 +12,9 @@ from tauhat.control.controller import Controller, ControlSample
 from tauhat.control.laws import Feedforward
 from tauhat.errors import ArrayError, SimulationError
 
+_RECENT = 50  # [steps] over which the memory of jumps fades
+_RATTLING = 0.1  # share of these in which a torque jumps by more than its limit: the loop is unstable
+
 
 class Counted(NamedTuple):
     """Memory of a controller within, and how many steps have passed."""
@@ -65,9 +68,21 @@ class NoisySight:
         return sample._replace(q=sample.q + self.position[row], dq=sample.dq + self.speed[row])
 
 
+class WatchedMemory(NamedTuple):
+    """Memory of a controller within, its last torque, and how often of late each torque jumped, (n_v,) each."""
+
+    inner: Any
+    torque: FloatArray
+    jumps: FloatArray
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Watched:
-    """A controller that gives up when a joint is farther from its reference than allowed.
+    """A controller that gives up when the robot is lost: too far from its reference, or rattling.
+
+    With torque limits an unstable loop seldom runs away: it swings between its limits, near the reference. A joint
+    rattles when its torque jumps by more than its limit in more than a tenth of the last steps (counted with a memory
+    that fades over 50).
 
     inner : the controller
     farthest : (n_v,) [rad or m]
@@ -92,29 +107,37 @@ class Watched:
         """The inner controller's."""
         return self.inner.torque_limit
 
-    def start(self, sample: ControlSample) -> Any:
-        """Return the inner controller's memory."""
-        return self.inner.start(sample)
+    def start(self, sample: ControlSample) -> WatchedMemory:
+        """Return the inner controller's memory, and no jump."""
+        return WatchedMemory(self.inner.start(sample), sample.tau, np.zeros(self.farthest.size))
 
-    def step(self, memory: Any, sample: ControlSample) -> tuple[Any, FloatArray]:
-        """Return the inner controller's memory and torque.
+    def step(self, memory: WatchedMemory, sample: ControlSample) -> tuple[WatchedMemory, FloatArray]:
+        """Return the memory behind this step, and the inner controller's torque.
 
         Raises
         ------
         SimulationError
-            when a joint is too far from its reference, or nowhere.
+            when a joint is too far from its reference, or nowhere, or rattles.
         """
         error = np.abs(sample.q - sample.q_ref)
         if not (error <= self.farthest).all():
             joint = int(np.argmax(np.where(np.isfinite(error), error / self.farthest, np.inf)))
-            raise SimulationError(
-                "the robot is lost",
-                where=f"joint {joint + 1}, t = {sample.t:.4g} s",
-                expected=f"within {self.farthest[joint]:g} of its reference",
-                got=f"{error[joint]:.3g}",
-                remedy="lower the gains, or start in the pose of the reference",
-            )
-        return self.inner.step(memory, sample)
+            expected, got = f"within {self.farthest[joint]:g} of its reference", f"{error[joint]:.3g}"
+            raise _lost("the robot is lost", joint, sample.t, expected=expected, got=got)
+        inner, torque = self.inner.step(memory.inner, sample)
+        jumped = np.abs(torque - memory.torque) > self.inner.torque_limit
+        jumps = memory.jumps * (1.0 - 1.0 / _RECENT) + jumped
+        if jumps.max() > _RATTLING * _RECENT:
+            joint = int(np.argmax(jumps))
+            got = f"{100.0 * jumps[joint] / _RECENT:.0f} %"
+            raise _lost("the robot rattles", joint, sample.t, expected="jumps in less than 10 % of the steps", got=got)
+        return WatchedMemory(inner, torque, jumps), torque
+
+
+def _lost(what: str, joint: int, t: float, *, expected: str, got: str) -> SimulationError:
+    where = f"joint {joint + 1}, t = {t:.4g} s"
+    remedy = "lower the gains, or start in the pose of the reference"
+    return SimulationError(what, where=where, expected=expected, got=got, remedy=remedy)
 
 
 def noisy_sight(

@@ -12,6 +12,8 @@ from tauhat.arrays import FloatArray
 from tauhat.verification.probes import LENGTHS, STRIBECK_SPEEDS, Probes
 from tauhat.verification.series import PredictedRows
 
+_PLAY = 0.05  # of the root mean square load: how close to zero the teeth change sides
+
 Dependence: TypeAlias = Literal[
     "speed", "direction", "position", "acceleration", "load", "time", "temperature", "another joint", "constant"
 ]
@@ -108,6 +110,12 @@ def _bending(view: JointView, _: Probes) -> FloatArray:
     return np.gradient(np.gradient(load, view.step), view.step)[None]
 
 
+def _play(view: JointView, _: Probes) -> FloatArray:
+    load = view.rows.load[view.joint]
+    side = np.tanh(load / max(_PLAY * float(np.sqrt(np.mean(load**2))), 1e-12))
+    return np.gradient(np.gradient(side, view.step), view.step)[None]
+
+
 def _neighbours(view: JointView, probes: Probes) -> FloatArray:
     near = [joint for joint in (view.joint - 1, view.joint + 1) if 0 <= joint < len(view.rows.probes)]
     rows = [probes.place(name) for name in ("dq", "sign", "ddq")]
@@ -137,6 +145,7 @@ _ADVICE: Mapping[str, str] = {
     "temperature": "friction depends on the temperature: fit on recordings at the temperature of the task",
     "delay": "position and torque are not at the same time: `delay_samples` in the map, see `tauhat check`",
     "elasticity": "the joint bends: no term has it, stay below its resonance with `--cutoff`",
+    "backlash": "the gear has play where its load changes sign: no term has it",
     "coupling with a neighbour": "a motor turns with two joints: the map's [coupling] section and the term coupling",
 }
 _CATALOGUE: tuple[tuple[str, Dependence, str, Callable[[JointView, Probes], FloatArray]], ...] = (
@@ -146,7 +155,7 @@ _CATALOGUE: tuple[tuple[str, Dependence, str, Callable[[JointView, Probes], Floa
     ("degressive friction", "speed", "cube-root", _own("cube root")),
     ("Stribeck friction", "speed", "stribeck", _own(*(f"stribeck {k}" for k in range(len(STRIBECK_SPEEDS))))),
     ("friction by direction", "speed", "viscous-asymmetry", _own("speed")),
-    ("pre-sliding or backlash", "direction", "dahl", _own(*(f"dahl {k}" for k in range(len(LENGTHS))))),
+    ("pre-sliding", "direction", "dahl", _own(*(f"dahl {k}" for k in range(len(LENGTHS))))),
     ("friction by load", "load", "load-coulomb", _own("load sign")),
     ("pre-sliding by load", "load", "load-dahl", _own("load dahl")),
     ("rotor inertia", "acceleration", "rotor", _own("ddq")),
@@ -155,6 +164,7 @@ _CATALOGUE: tuple[tuple[str, Dependence, str, Callable[[JointView, Probes], Floa
     ("coupling with a neighbour", "another joint", "coupling", _neighbours),
     ("delay", "acceleration", "", _delay),
     ("elasticity", "acceleration", "", _bending),
+    ("backlash", "load", "", _play),
     ("warm-up", "time", "", _warm_up),
     ("drift", "time", "", _drift),
     ("temperature", "temperature", "", _heat),

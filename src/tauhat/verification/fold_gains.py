@@ -20,6 +20,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, IntArray
 
 WIDTHS = (1e-3, 1.0, 10.0, 100.0)  # standard errors that parameters may be off
+_SUREST = 1e-12  # standard error below which there is none
 _RIDGE = 1e-6  # of the columns' own squares: candidates that cannot be told from another
 
 
@@ -27,11 +28,13 @@ _RIDGE = 1e-6  # of the columns' own squares: candidates that cannot be told fro
 class Folds:
     """The squares and products of columns and residual in each stretch of time.
 
-    grams : (n_folds, m + 1, m + 1), the residual last; columns of unit root mean square but the parameters' own
+    columns : (m + 1, n), the residual last; of unit root mean square but the parameters' own
+    grams : (n_folds, m + 1, m + 1) their products
     n_own : columns of the parameters' errors, which come first
     penalty : `s^2 k`, of one parameter error of one standard error
     """
 
+    columns: FloatArray
     grams: FloatArray
     n_own: int
     penalty: float
@@ -42,7 +45,7 @@ class Folds:
         size = np.sqrt(np.mean(others**2, axis=1))
         columns = np.vstack([own, others / np.where(size > 0.0, size, 1.0)[:, None], residual])
         grams = np.array([part @ part.T for part in np.array_split(columns, folds, axis=1)])
-        return cls(grams=grams, n_own=len(own), penalty=float(np.mean(residual**2)) * redundancy)
+        return cls(columns=columns, grams=grams, n_own=len(own), penalty=float(np.mean(residual**2)) * redundancy)
 
     @property
     def squares(self) -> FloatArray:
@@ -61,8 +64,16 @@ class Folds:
 
     def free(self, chosen: IntArray) -> FloatArray:
         """Return the best of `left` over the widths, as a whole."""
-        tried = [self.left(chosen, width=width) for width in WIDTHS]
-        return min(tried, key=lambda squares: float(squares.sum()))
+        return self.left(chosen, width=self._best_width(chosen))
+
+    def remaining(self, chosen: IntArray) -> FloatArray:
+        """Return the residual that a fit of these columns on the whole recording leaves, (n,)."""
+        places = self._places(chosen)
+        solution = self._solved(self.grams.sum(axis=0)[None], chosen, self._best_width(chosen))[0]
+        return np.asarray(self.columns[-1] - solution @ self.columns[places])
+
+    def _best_width(self, chosen: IntArray) -> float:
+        return min(WIDTHS, key=lambda width: float(self.left(chosen, width=width).sum()))
 
     def free_choice(self, fixed: IntArray, choices: tuple[IntArray, ...]) -> tuple[FloatArray, IntArray]:
         """Return what is left when each fold takes the choice that fits best on the others, and all folds together's.
@@ -72,7 +83,7 @@ class Folds:
         fixed : columns that are in, whatever is chosen
         choices : columns of each choice
         """
-        width = min(WIDTHS, key=lambda width: float(self.left(fixed, width=width).sum()))
+        width = self._best_width(fixed)
         inside = np.empty((len(choices), len(self.grams)))
         outside = np.empty_like(inside)
         for row, choice in enumerate(choices):
@@ -88,8 +99,10 @@ class Folds:
 
     def _solutions(self, chosen: IntArray, width: float) -> FloatArray:
         """Return the solutions on all folds but one, (n_folds, m)."""
+        return self._solved(self.grams.sum(axis=0) - self.grams, chosen, width)
+
+    def _solved(self, training: FloatArray, chosen: IntArray, width: float) -> FloatArray:
         places = self._places(chosen)
-        training = self.grams.sum(axis=0) - self.grams
         matrix = training[:, places[:, None], places[None]]
         ridge = np.concatenate([np.full(self.n_own, self.penalty / width**2), np.zeros(chosen.size)])
         diagonal = np.einsum("fkk->fk", matrix)
@@ -125,11 +138,26 @@ def gain(before: FloatArray, after: FloatArray, whole: FloatArray) -> Gain:
     """
     from scipy.special import stdtr
 
-    count, total = len(whole), float(whole.sum())
-    share = float((before - after).sum()) / total
-    spread = count / (count - 1) * float(np.sum((before - after - share * whole) ** 2))
-    error = max(np.sqrt(spread) / total, 1e-12)
-    return Gain(share=share, standard_error=float(error), p=float(stdtr(count - 1, -share / error)))
+    tiny = float(np.finfo(float).tiny)
+    count, total = len(whole), max(float(before.sum()), tiny)
+    part = float((before - after).sum()) / total
+    spread = count / (count - 1) * float(np.sum((before - after - part * before) ** 2))
+    error = max(float(np.sqrt(spread)) / total, _SUREST)
+    scale = total / max(float(whole.sum()), tiny)
+    return Gain(share=scale * part, standard_error=scale * error, p=float(stdtr(count - 1, -part / error)))
+
+
+def chance_of_gain(before: FloatArray, after: FloatArray, *, columns: int, effective: float) -> float:
+    """Return how likely so many columns gain as much by chance among `effective` independent rows, by Fisher's F.
+
+    Folds that are short beside the memory of a residual are not independent of one another; `effective` is counted on
+    what the columns leave, so that an effect's own slow shape does not count against it.
+    """
+    from scipy.special import fdtrc
+
+    left, gained = float(after.sum()), float((before - after).sum())
+    free = max(effective - columns - 1.0, 1.0)
+    return float(fdtrc(columns, free, gained / columns / max(left / free, np.finfo(float).tiny))) if gained > 0 else 1.0
 
 
 def passing(p_values: FloatArray, *, rate: float) -> float:

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.model import TERMS
 from tauhat.verification.effects import Candidate, Dependence
-from tauhat.verification.fold_gains import Folds, gain
-from tauhat.verification.whiteness import Whiteness
+from tauhat.verification.fold_gains import Folds, chance_of_gain, gain
+from tauhat.verification.whiteness import Whiteness, correlated_rows
 
 LEAST_SHARE = 0.02  # of the squared residual that an effect must remove to be named
 LEAST_ERRORS = 2.0  # standard errors that it must remove
@@ -81,142 +82,137 @@ class JointCase:
         return Folds.of(self.root.T @ self.own, others, self.residual, folds=self.folds, redundancy=redundancy)
 
 
-class Trial(NamedTuple):
-    """A candidate, the effect that it showed by itself, and its columns among those of all candidates of the joint."""
+class Outcome(NamedTuple):
+    """A candidate, the columns of it that do best, the squared residual of each fold that they leave, in words."""
 
     candidate: Candidate
+    best: IntArray
+    left: FloatArray
     effect: Effect
-    places: tuple[IntArray, ...]
+
+    @property
+    def cost(self) -> int:
+        """Columns that it takes; a choice among many counts as one more."""
+        return int(self.best.size) + bool(self.candidate.choices)
 
 
-def trials(case: JointCase, found: Sequence[Candidate]) -> tuple[Trial, ...]:
-    """Return every candidate with what it removes by itself, strongest first."""
-    folds = case.cut(_columns_of(found))
-    before = folds.free(_none())
-    places = _places_of(found)
-    tried = []
-    for candidate, own in zip(found, places, strict=True):
-        after, best = _left(folds, _none(), own)
-        tried.append(Trial(candidate, _effect(candidate, (before, after, folds.squares), best, own), own))
-    return tuple(sorted(tried, key=lambda trial: -trial.effect.share))
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Search:
+    """The candidates of one joint, and the folds that judge them.
 
+    places : of each candidate's columns among those of all, one entry a choice
+    """
 
-def named(case: JointCase, searched: Sequence[Trial], threshold: float) -> tuple[Effect, ...]:
-    """Return the effects that are there beside one another: the strongest first, the others with it in the model."""
-    folds = _folds_again(case, searched)
-    chosen, taken = _none(), []
-    before = folds.free(chosen)
-    rest = list(searched)
-    while rest and len(taken) < _MOST_NAMED:
-        steps = [(_left(folds, chosen, trial.places), trial) for trial in rest]
-        effects = [
-            _effect(trial.candidate, (before, after, folds.squares), best, trial.places)
-            for (after, best), trial in steps
+    folds: Folds
+    candidates: tuple[Candidate, ...]
+    places: tuple[tuple[IntArray, ...], ...]
+
+    @classmethod
+    def of(cls, case: JointCase, found: Sequence[Candidate]) -> Search:
+        """Return the search among these candidates."""
+        starts = np.cumsum([0, *(len(candidate.columns) for candidate in found)])
+        places = tuple(
+            tuple(start + np.array(choice) for choice in candidate.choices)
+            or (np.arange(start, start + len(candidate.columns)),)
+            for start, candidate in zip(starts[:-1], found, strict=True)
+        )
+        folds = case.cut(np.concatenate([candidate.columns for candidate in found]))
+        return cls(folds=folds, candidates=tuple(found), places=places)
+
+    def outcomes(self, fixed: IntArray, without: Sequence[str] = ()) -> tuple[Outcome, ...]:
+        """Return what every candidate adds to the fixed columns, strongest first.
+
+        Parameters
+        ----------
+        without : effects that are left out
+        """
+        before = self.folds.free(fixed)
+        found = [
+            self._outcome(candidate, own, fixed, before)
+            for candidate, own in zip(self.candidates, self.places, strict=True)
+            if candidate.effect not in without
         ]
-        passing = [k for k, effect in enumerate(effects) if effect.passes(threshold)]
+        return tuple(sorted(found, key=lambda outcome: -outcome.effect.share))
+
+    def _outcome(self, candidate: Candidate, own: tuple[IntArray, ...], fixed: IntArray, before: FloatArray) -> Outcome:
+        order = None
+        if candidate.choices:
+            left, best = self.folds.free_choice(fixed, own)
+            order = float(candidate.labels[[int(place[0]) for place in own].index(int(best[0]))])
+        else:
+            best = own[0]
+            left = self.folds.free(np.concatenate([fixed, best]))
+        rest = self.folds.remaining(np.concatenate([fixed, best]))
+        return Outcome(candidate, best, left, judged(candidate, self.folds, (before, left), rest=rest, order=order))
+
+
+def judged(
+    candidate: Candidate,
+    folds: Folds,
+    squares: tuple[FloatArray, FloatArray],
+    *,
+    rest: FloatArray,
+    order: float | None = None,
+) -> Effect:
+    """Return an effect with the gain from squared residuals before to after, and `rest`, (n,), that it leaves."""
+    found = gain(*squares, folds.squares)
+    columns = 2 if candidate.choices else len(candidate.columns)
+    by_chance = chance_of_gain(*squares, columns=columns, effective=rest.size / correlated_rows(rest - rest.mean()))
+    return Effect(
+        effect=candidate.effect, dependence=candidate.dependence, term=candidate.term, advice=candidate.advice,
+        share=found.share, standard_error=found.standard_error, p=max(found.p, by_chance), order=order,
+    )  # fmt: skip
+
+
+def named(search: Search, threshold: float) -> tuple[Effect, ...]:
+    """Return the effects that are there beside one another: the strongest first, the others with it in the model."""
+    chosen = no_columns()
+    taken: list[Effect] = []
+    while len(taken) < _MOST_NAMED:
+        outcomes = search.outcomes(chosen, [effect.effect for effect in taken])
+        passing = [outcome for outcome in outcomes if outcome.effect.passes(threshold)]
         if not passing:
             break
-        pick, beside = _simplest(passing, steps, folds.squares)
-        taken.append(_with_alternatives(effects[pick], [rest[k].candidate.effect for k in beside]))
-        (before, best), trial = steps[pick]
-        chosen = np.concatenate([chosen, best])
-        rest.remove(trial)
+        equal = _as_good(passing, search.folds.squares)
+        pick = min(equal, key=lambda outcome: outcome.cost)
+        others = tuple(outcome.candidate.effect for outcome in equal if outcome is not pick)
+        taken.append(replace(pick.effect, alternatives=others))
+        chosen = np.concatenate([chosen, pick.best])
     return tuple(taken)
 
 
-def _simplest(
-    passing: Sequence[int], steps: Sequence[tuple[tuple[FloatArray, IntArray], Trial]], whole: FloatArray
-) -> tuple[int, list[int]]:
-    """Return which of the steps to take, and which others do as well: of those the one with the fewest columns."""
-    strongest = min(passing, key=lambda k: float(steps[k][0][0].sum()))
-    least = steps[strongest][0][0]
-    equal = []
-    for k in passing:
-        worse = gain(steps[k][0][0], least, whole)
-        if k == strongest or worse.share <= worse.standard_error:
-            equal.append(k)
-    pick = min(equal, key=lambda k: (_cost(steps[k]), float(steps[k][0][0].sum())))
-    return pick, [k for k in equal if k != pick]
-
-
-def _cost(step: tuple[tuple[FloatArray, IntArray], Trial]) -> int:
-    (_, best), trial = step
-    return int(best.size) + bool(trial.candidate.choices)
+def _as_good(passing: Sequence[Outcome], whole: FloatArray) -> list[Outcome]:
+    """Return the strongest outcome and those that leave as little within one standard error, strongest first."""
+    strongest = passing[0]
+    beside = [(outcome, gain(outcome.left, strongest.left, whole)) for outcome in passing[1:]]
+    return [strongest, *(outcome for outcome, worse in beside if worse.share <= worse.standard_error)]
 
 
 def changes(case: JointCase) -> tuple[Effect, ...]:
     """Return by how much refitting groups of the model's own parameters on this recording lowers the residual."""
-    size = np.array([TERMS[key].dissipates if key in TERMS else False for key in case.terms], dtype=bool)
+    brakes = np.array([key in TERMS and TERMS[key].dissipates for key in case.terms], dtype=bool)
     constant = np.array([key == "offset" for key in case.terms], dtype=bool)
-    groups = (
-        ("friction has changed", "speed", size, "friction is another than in the fit: temperature, wear, lubricant"),
+    groups: tuple[tuple[str, Dependence, NDArray[np.bool_], str], ...] = (
+        ("friction has changed", "speed", brakes, "friction is another than in the fit: temperature, wear, lubricant"),
         ("offset has changed", "constant", constant, "the zero of the torque has moved"),
-        ("inertia has changed", "load", ~size & ~constant, "a payload or tool that was not there? `tauhat payload`"),
+        ("inertia has changed", "load", ~brakes & ~constant, "something was carried? See `tauhat payload`"),
     )
     folds = case.cut(case.own)
-    before = folds.left(_none(), width=1.0)
+    before = folds.left(no_columns(), width=1.0)
     found = []
     for effect, dependence, members, advice in groups:
         places = np.flatnonzero(members)
         if not places.size:
             continue
-        after = folds.left(places, width=1.0)
+        terms = ", ".join(dict.fromkeys(key for key, member in zip(case.terms, members, strict=True) if member))
         candidate = Candidate(
-            effect=effect, dependence=dependence, term=_joined(case, members), advice=advice, columns=case.own[places]
+            effect=effect, dependence=dependence, term=terms, advice=advice, columns=case.own[places]
         )  # fmt: skip
-        found.append(_effect(candidate, (before, after, folds.squares), places, (places,)))
+        after = folds.left(places, width=1.0)
+        found.append(judged(candidate, folds, (before, after), rest=folds.remaining(places)))
     return tuple(sorted(found, key=lambda item: -item.share))
 
 
-def _joined(case: JointCase, members: FloatArray) -> str:
-    return ", ".join(dict.fromkeys(key for key, member in zip(case.terms, members, strict=True) if member))
-
-
-def _left(folds: Folds, fixed: IntArray, places: tuple[IntArray, ...]) -> tuple[FloatArray, IntArray]:
-    """Return what a candidate leaves beside the fixed columns, and which of its columns do that."""
-    if len(places) == 1:
-        return folds.free(np.concatenate([fixed, places[0]])), places[0]
-    return folds.free_choice(fixed, places)
-
-
-def _effect(
-    candidate: Candidate,
-    squares: tuple[FloatArray, FloatArray, FloatArray],
-    best: IntArray,
-    places: tuple[IntArray, ...],
-) -> Effect:
-    found = gain(*squares)
-    order = None
-    if candidate.choices:
-        order = float(candidate.labels[[int(place[0]) for place in places].index(int(best[0]))])
-    return Effect(
-        effect=candidate.effect, dependence=candidate.dependence, term=candidate.term, advice=candidate.advice,
-        share=found.share, standard_error=found.standard_error, p=found.p, order=order,
-    )  # fmt: skip
-
-
-def _with_alternatives(effect: Effect, names: Sequence[str]) -> Effect:
-    return replace(effect, alternatives=tuple(names))
-
-
-def _columns_of(found: Sequence[Candidate]) -> FloatArray:
-    return np.concatenate([candidate.columns for candidate in found])
-
-
-def _places_of(found: Sequence[Candidate]) -> list[tuple[IntArray, ...]]:
-    starts = np.cumsum([0, *(len(candidate.columns) for candidate in found)])
-    return [
-        tuple(start + np.array(choice) for choice in candidate.choices)
-        or (np.arange(start, start + len(candidate.columns)),)
-        for start, candidate in zip(starts[:-1], found, strict=True)
-    ]
-
-
-def _folds_again(case: JointCase, searched: Sequence[Trial]) -> Folds:
-    """Return the folds with the columns in the order that the trials' places count in."""
-    first = sorted(searched, key=lambda trial: int(trial.places[0][0]))
-    return case.cut(_columns_of([trial.candidate for trial in first]))
-
-
-def _none() -> IntArray:
+def no_columns() -> IntArray:
+    """Return no column at all."""
     return np.zeros(0, dtype=np.intp)

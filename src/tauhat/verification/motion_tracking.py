@@ -184,7 +184,9 @@ def tracking_contenders(
     robot = estimate.robot
     if not robot.has_inertia:
         raise ModelError(
-            "the description has no masses to compare with", where=robot.name, remedy="use a URDF with inertial elements"
+            "the description has no masses to compare with",
+            where=robot.name,
+            remedy="use a URDF with inertial elements",
         )
     samples = motion.sample(np.linspace(0.0, motion.duration, _LOOKED_AT))
     gravity = tracking_gains(
@@ -197,9 +199,7 @@ def tracking_contenders(
     return (
         Contender(name="PD", knows="none", controller=PD(**gains)),
         Contender(name="PD + gravity", knows="nominal", controller=gravity),
-        Contender(
-            name="feedforward, nominal", knows="nominal", controller=ModelFeedforward(torque=nominal, law=law)
-        ),
+        Contender(name="feedforward, nominal", knows="nominal", controller=ModelFeedforward(torque=nominal, law=law)),
         Contender(
             name="feedforward, identified", knows="identified", controller=ModelFeedforward(torque=found, law=law)
         ),

@@ -22,7 +22,7 @@ from tauhat.estimation.estimate import Estimate
 from tauhat.recordings.choice import top_speeds
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
-from tauhat.verification.joint_search import Effect, JointCase, Trial, changes, named, trials
+from tauhat.verification.joint_search import Effect, JointCase, Search, changes, named, no_columns
 from tauhat.verification.effects import JointView, candidates
 from tauhat.verification.fold_gains import passing
 from tauhat.verification.probes import ORDERS, Probes
@@ -147,30 +147,27 @@ def _log_residuals(
         )  # fmt: skip
     cases = [_case(estimate, recording, rows, joint, processing) for joint in range(estimate.robot.n_v)]
     present = _present(estimate)
-    searched = [
-        trials(case, candidates(_view(recording, rows, joint), probes, present)) for joint, case in enumerate(cases)
+    searches = [
+        Search.of(case, candidates(_view(recording, rows, joint), probes, present)) for joint, case in enumerate(cases)
     ]
+    tried = [tuple(outcome.effect for outcome in search.outcomes(no_columns())) for search in searches]
     changed = [changes(case) for case in cases]
-    threshold = passing(_p_values(searched, changed), rate=FALSE_ALARMS)
+    threshold = passing(np.array([effect.p for group in (*tried, *changed) for effect in group]), rate=FALSE_ALARMS)
     return LogResiduals(
         log=recording.name,
         joints=tuple(
-            _joint(case, trial, [effect for effect in change if effect.passes(threshold)], threshold)
-            for case, trial, change in zip(cases, searched, changed, strict=True)
+            _joint(case, named(search, threshold), [effect for effect in change if effect.passes(threshold)], every)
+            for case, search, change, every in zip(cases, searches, changed, tried, strict=True)
         ),
     )
 
 
-def _p_values(searched: Sequence[Sequence[Trial]], changed: Sequence[Sequence[Effect]]) -> FloatArray:
-    found = [trial.effect.p for group in searched for trial in group]
-    return np.array(found + [effect.p for group in changed for effect in group])
-
-
-def _joint(case: JointCase, searched: Sequence[Trial], changed: Sequence[Effect], threshold: float) -> JointResidual:
+def _joint(
+    case: JointCase, missing: Sequence[Effect], changed: Sequence[Effect], tried: Sequence[Effect]
+) -> JointResidual:
     return JointResidual(
         name=case.name, unit=case.unit, rms=case.rms, relative_rms=case.relative_rms, rows=case.residual.size,
-        whiteness=case.whiteness, changed=tuple(changed), missing=named(case, searched, threshold),
-        tried=tuple(trial.effect for trial in searched),
+        whiteness=case.whiteness, changed=tuple(changed), missing=tuple(missing), tried=tuple(tried),
     )  # fmt: skip
 
 
