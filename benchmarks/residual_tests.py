@@ -29,7 +29,6 @@ from tauhat.simulation import (
     ElasticJoints,
     ExperimentSettings,
     FrictionHeat,
-    SensorErrors,
     TrueParameters,
     simulate,
     typical_plant,

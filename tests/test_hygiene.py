@@ -46,6 +46,7 @@ LEVELS = {
             ("verification",),
             ("studies",),
             ("export", "report"),
+            ("project",),
             ("cli",),
             ("__main__",),
         ]

@@ -72,6 +72,10 @@ class OutputError(TauhatError):
     """A file that could not be written; nothing half-written is left behind."""
 
 
+class ProjectError(TauhatError):
+    """A project whose file cannot be read, whose folder another run works in, or whose logs cannot be used."""
+
+
 class MissingExtraError(TauhatError):
     """An optional library is missing; names the extra that installs it."""
 

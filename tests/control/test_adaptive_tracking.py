@@ -108,7 +108,7 @@ def test_the_lyapunov_function_falls_at_every_step_by_at_least_what_the_gain_tak
     assert energy[-1] < 0.2 * energy[0]
 
 
-def test_with_viscous_friction_alone_the_fall_is_exactly_what_gain_and_friction_take():
+def test_without_friction_the_lyapunov_function_falls_by_exactly_what_the_gain_takes():
     regressor = tracking_regressor(torque_model(ARM, "inertia"), base_parameters(torque_model(ARM, "inertia")))
     base = base_parameters(torque_model(ARM, "inertia"))
     true = base.projection @ ARM.inertia.ravel()

@@ -109,7 +109,7 @@ def test_gains_that_cannot_be_tuned_or_judged_are_refused():
         tune_gains(place, law, unseen=replace(other, seed=place.seed), search=SEARCH)
     with pytest.raises(ModelError, match="kd to begin with; expected positive gains, got 0"):
         tune_gains(place, PD(kp=law.kp, kd=0.0 * law.kd), unseen=other, search=SEARCH)
-    with pytest.raises(SimulationError, match="the gains set by hand are unstable; .*the robot is lost"):
+    with pytest.raises(SimulationError, match=r"the gains set by hand are unstable; .*the robot is lost"):
         tune_gains(place, PD(kp=np.full(6, 1e-3), kd=np.full(6, 1e-3)), unseen=other, search=SEARCH)
 
 

@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-
 from motion_cases import rehearsed
+
 from sample_arms import planar_truth
 from tauhat.dynamics import torque_model
 from tauhat.errors import ModelError

@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-
 from motion_cases import ARM, SETTINGS, rehearsed
-from tauhat.control import PD, PDFeedforward, ModelFeedforward
+
+from tauhat.control import PD, ModelFeedforward, PDFeedforward
 from tauhat.errors import ModelError
 from tauhat.estimation.identified_torque import identified_torque
 from tauhat.simulation import simulate
@@ -83,7 +83,9 @@ def test_an_unstable_controller_is_told_and_does_not_end_the_comparison():
     case = rehearsed()
     wild = PDFeedforward(kp=np.full(6, 1e7), kd=np.zeros(6))
     contenders = [
-        Contender(name="wild", knows="none", controller=ModelFeedforward(torque=identified_torque(case.estimate), law=wild)),
+        Contender(
+            name="wild", knows="none", controller=ModelFeedforward(torque=identified_torque(case.estimate), law=wild)
+        ),
         Contender(name="PD", knows="none", controller=case.law),
     ]
     result = compare_tracking(case.estimate, case.unseen, truth=case.truth, settings=SETTINGS, contenders=contenders)

@@ -22,8 +22,10 @@ from tauhat.cli.commands import (
     identify,
     inspect,
     payload,
+    rehearse,
     report,
     robots,
+    run,
     simulate,
     study,
     verify,
@@ -41,11 +43,13 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("demo")(as_command(demo.run, demo.Options))
+app.command("run")(as_command(run.run, run.Options))
 app.command("robots")(as_command(robots.run, robots.Options))
 app.command("inspect")(as_command(inspect.run, inspect.Options))
 app.command("check")(as_command(check.run, check.Options))
 app.command("excite")(as_command(excite.run, excite.Options))
 app.command("simulate")(as_command(simulate.run, simulate.Options))
+app.command("rehearse")(as_command(rehearse.run, rehearse.Options))
 app.command("identify")(as_command(identify.run, identify.Options))
 app.command("verify")(as_command(verify.run, verify.Options))
 app.command("payload")(as_command(payload.run, payload.Options))

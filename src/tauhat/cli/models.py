@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from tauhat.robots.robot import Robot
 
 AUTO = "auto"
-_WHOLE = frozenset({"plain", "robust", AUTO})
 
 
 def model_of(robot: Robot, text: str, recordings: Sequence[Recording] | Sequence[LogFacts] = ()) -> TorqueModel:
@@ -20,11 +19,7 @@ def model_of(robot: Robot, text: str, recordings: Sequence[Recording] | Sequence
 
     plain, robust and auto bring the coupling of motors that, after the log's map, turn with two joints.
     """
-    from tauhat.dynamics.model import torque_model
-    from tauhat.dynamics.model_file import load_model
+    from tauhat.dynamics.named_model import named_model
 
-    if text.endswith(".toml"):
-        return load_model(text, robot)
-    names = "robust" if text.strip() == AUTO else text
-    shared = any(recording.shared_motors for recording in recordings)
-    return torque_model(robot, f"{names},coupling" if text.strip() in _WHOLE and shared else names)
+    shared = [motor for recording in recordings for motor in recording.shared_motors]
+    return named_model(robot, text, shared_motors=shared)

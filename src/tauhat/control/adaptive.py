@@ -17,8 +17,8 @@ the part of s beyond it teaches (V counts that part alone); and bounds, to which
 diagonal G and x* within the bounds that only lowers V. Nothing is learnt before the motion starts, and none while a
 torque is at its limit: s then says nothing about the parameters.
 
-Source: Slotine, Li, "On the adaptive control of robot manipulators", 1987; dead zone: Peterson, Narendra, "Bounded error
-adaptive control", 1982.
+Source: Slotine, Li, "On the adaptive control of robot manipulators", 1987; dead zone: Peterson, Narendra, "Bounded
+error adaptive control", 1982.
 """
 
 from __future__ import annotations
@@ -103,7 +103,9 @@ class AdaptiveTracking:
         bounded = bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
         if bounded and np.count_nonzero(learning - np.diag(np.diag(learning))):
             raise ModelError(
-                "bounds need a diagonal matrix of learning", where=where, remedy="keep its diagonal, or leave out bounds"
+                "bounds need a diagonal matrix of learning",
+                where=where,
+                remedy="keep its diagonal, or leave out bounds",
             )
 
     def start(self, sample: ControlSample) -> Learnt:

@@ -119,7 +119,7 @@ def model_torque(model: TorqueModel, standard: FloatArray) -> ModelTorque:
 
 
 def nominal_torque(robot: Robot) -> ModelTorque:
-    """Return the torque of the robot's description: links, rotors, viscous and Coulomb friction as far as it has them."""
+    """Return the torque of the robot's description: links, rotors, and what friction it states."""
     model = torque_model(robot, _DESCRIBED_TERMS)
     values = [
         float(getattr(robot.joints[parameter.joint], _NOMINAL[parameter.symbol]))

@@ -1,7 +1,7 @@
 """The torque of a whole model at one state: `M(q) a + b(q, v) + Ia a + passive(q_p, v_p)`.
 
-Rigid links and rotors are at the state (q, v, a); friction, springs and offsets at (q_p, v_p), which may be another one:
-that of a reference, where measured speeds are too noisy for a sign. The load that friction may grow with is
+Rigid links and rotors are at the state (q, v, a); friction, springs and offsets at (q_p, v_p), which may be another
+one: that of a reference, where measured speeds are too noisy for a sign. The load that friction may grow with is
 `|M a + b|`. Bristles bend by the displacement since the step before, exactly, whatever its size (`passive_kernel`).
 
 Arguments in tuples: `body` are links, inertia (n_v, 10), rotor (n_v,), elements of `passive_kernel`; `state` q, v, a;
@@ -43,5 +43,5 @@ def model_torque_kernel(body, state, passing, bent, out):  # type: ignore[no-unt
 def bend_kernel(elements, moved, bent):  # type: ignore[no-untyped-def]
     """Change the states of the bristles, `bent` (n_elements,), by a displacement of the joints `moved` (n_v,)."""
     for k in range(elements.size):
-        if elements[k].kind == DAHL or elements[k].kind == LOAD_DAHL:  # noqa: PLR1714 - compiled
+        if elements[k].kind == DAHL or elements[k].kind == LOAD_DAHL:
             bent[k] = bent_by(moved[elements[k].joint], elements[k].shape, bent[k])

@@ -60,7 +60,9 @@ class TrackingRegressor:
         bend_kernel(self.elements, moved[self.passive[:, 1]], after)
         return after
 
-    def columns(self, state: tuple[FloatArray, FloatArray], v: FloatArray, dv: FloatArray, *, bent: FloatArray) -> FloatArray:
+    def columns(
+        self, state: tuple[FloatArray, FloatArray], v: FloatArray, dv: FloatArray, *, bent: FloatArray
+    ) -> FloatArray:
         """Return Y, (n_v, n_b).
 
         Parameters

@@ -8,6 +8,7 @@ from tauhat.estimation.estimate import Estimate, InputLog, ParameterRow, load_es
 from tauhat.estimation.estimators import ESTIMATORS, estimator_named
 from tauhat.estimation.evidence import Evidence, collect, collect_all
 from tauhat.estimation.hybrid import HybridLeastSquares
+from tauhat.estimation.identified_torque import identified_torque
 from tauhat.estimation.identify import identify
 from tauhat.estimation.idim_iv import InstrumentalVariables
 from tauhat.estimation.least_squares import Estimator, OrdinaryLeastSquares, WeightedLeastSquares
@@ -94,6 +95,7 @@ __all__ = [
     "consistent",
     "essential_parameters",
     "estimator_named",
+    "identified_torque",
     "identify",
     "identify_files",
     "identify_payload",

@@ -11,7 +11,7 @@ def identified_torque(estimate: Estimate) -> ModelTorque:
     """Return the torque of an estimate, with all its terms, for feedforward and computed torque.
 
     Friction that the fit made with a plain sign gets one that turns within 1e-3 rad/s or m/s. Friction that grows with
-    the load is loaded by the torque of these links, as in simulation; `Estimate.predict` takes those of the pass before.
+    the load is loaded by these links, as in simulation; `Estimate.predict` takes those of the pass before.
 
     Raises
     ------

@@ -31,9 +31,13 @@ from tauhat.excitation.limits import (
     motion_limits,
     parse_limits,
 )
+from tauhat.excitation.point_to_point import PointToPoint, Quintic, Trapezoidal, point_to_point
 from tauhat.excitation.repeated import Repeated
 from tauhat.excitation.sampled import SampledMotion, sampled_motion
 from tauhat.excitation.space import FourierSpace, SampledSpace, random_points
+from tauhat.excitation.static_motion import static_motion
+from tauhat.excitation.sweep import Sweep, sweep
+from tauhat.excitation.task_path import TaskPath, task_path
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
 
 __all__ = [
@@ -58,10 +62,15 @@ __all__ = [
     "MotionLimit",
     "MotionLimits",
     "MotionSamples",
+    "PointToPoint",
+    "Quintic",
     "Repeated",
     "SampledMotion",
     "SampledSpace",
+    "Sweep",
+    "TaskPath",
     "Trajectory",
+    "Trapezoidal",
     "after_evidence",
     "after_motions",
     "criterion_named",
@@ -74,9 +83,13 @@ __all__ = [
     "motion_limits",
     "parse_limits",
     "payload_information",
+    "point_to_point",
     "random_fourier",
     "random_points",
     "rest_basis",
     "sampled_motion",
+    "static_motion",
+    "sweep",
+    "task_path",
     "with_exact_sign",
 ]

@@ -3,5 +3,13 @@
 from tauhat.report.page import write_motion_report, write_report
 from tauhat.report.study_page import write_study
 from tauhat.report.thinning import thinned, thinned_cloud
+from tauhat.report.tracking_page import write_tracking_report
 
-__all__ = ["thinned", "thinned_cloud", "write_motion_report", "write_report", "write_study"]
+__all__ = [
+    "thinned",
+    "thinned_cloud",
+    "write_motion_report",
+    "write_report",
+    "write_study",
+    "write_tracking_report",
+]

@@ -81,9 +81,8 @@ from tauhat.arrays import FloatArray
 from tauhat.control.laws import PD, PID, PDFeedforward, PDGravity, TrackingLaw
 from tauhat.errors import SimulationError, TauhatError
 from tauhat.excitation.limits import load_limits
-from tauhat.excitation.sampled import sampled_motion
+from tauhat.excitation.motion_file import motion_for
 from tauhat.files import read_text
-from tauhat.recordings.reading import read_recording
 from tauhat.robots.library import builtin_names, load_robot
 from tauhat.robots.robot import Robot
 from tauhat.robots.toml_fields import TomlFields
@@ -217,11 +216,7 @@ def _motion(fields: TomlFields, robot: Robot, folder: Path) -> MotionPlan:
     if "file" in fields.table:
         if len(fields.table) > 1:
             raise SimulationError("a motion file has its own length and shape", where=fields.where, got=[*fields.table])
-        given = sampled_motion(read_recording(folder / fields.text("file")))
-        if given.n_v != robot.n_v:
-            expected = f"{robot.n_v} joints of {robot.name}"
-            raise SimulationError("a motion of another robot", where=fields.where, expected=expected, got=given.n_v)
-        return MotionPlan(given=given)
+        return MotionPlan(given=motion_for(robot, folder / fields.text("file")))
     usual = MotionPlan()
     return MotionPlan(
         kind="random" if fields.choice("kind", ("designed", "random"), usual.kind) == "random" else "designed",
@@ -276,17 +271,19 @@ def _controller(fields: TomlFields, robot: Robot) -> TrackingLaw | None:
 def _sensors(fields: TomlFields, robot: Robot) -> SensorErrors:
     fields.refuse_unknown(("preset", "scale", *_SENSORS))
     start = sensor_preset(fields.text("preset"), robot) if "preset" in fields.table else SensorErrors()
-    given: dict[str, Any] = {}
-    for key in fields.table:
-        if key in _WORDS:
-            given[key] = fields.text(key)
-        elif key in _OF_THE_CLOCK:
-            given[key] = fields.number(key)
-        elif key == "ripples":
-            given[key] = tuple(_ripple(ripple, robot) for ripple in fields.subtables(key))
-        elif key in _SENSORS:
-            given[key] = joint_row(fields, key, robot, 1.0 if key == "torque_factor" else 0.0)
+    given = {key: _sensor_value(fields, key, robot) for key in fields.table if key in _SENSORS}
     return replace(start.scaled(fields.number("scale", 1.0)), **given)
+
+
+def _sensor_value(fields: TomlFields, key: str, robot: Robot) -> Any:
+    """Return the value of one sensor error."""
+    if key in _WORDS:
+        return fields.text(key)
+    if key in _OF_THE_CLOCK:
+        return fields.number(key)
+    if key == "ripples":
+        return tuple(_ripple(ripple, robot) for ripple in fields.subtables(key))
+    return joint_row(fields, key, robot, 1.0 if key == "torque_factor" else 0.0)
 
 
 def _ripple(fields: TomlFields, robot: Robot) -> Ripple:

@@ -1,4 +1,4 @@
-"""What gains are tried on: a rehearsed plant with delay, coarse encoders and noise in the loop, and what a run costs."""
+"""What gains are tried on: a plant with delay, coarse encoders and noise in the loop, and what a run costs."""
 
 from __future__ import annotations
 

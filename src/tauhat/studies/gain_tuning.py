@@ -1,14 +1,15 @@
 """Gains of a tracking law by Bayesian optimisation on a rehearsed plant, against gains set by hand.
 
-The search is for the logarithms of factors on the gains set by hand: one factor on each kind of gain for all joints, and
-a smaller one for each joint. The cost is the tracking error in parts of that of the hand-set gains, plus a small price
-of torque and of its chatter, which noise, delay and high gains make:
+The search is for the logarithms of factors on the gains set by hand: one factor on each kind of gain for all joints,
+and a smaller one for each joint. The cost is the tracking error in parts of that of the hand-set gains, plus a small
+price of torque and of its chatter, which noise, delay and high gains make:
 
     cost = mean_j e_j / e0_j + p_effort mean_j tau_j / tau0_j + p_chatter mean_j dtau_j / dtau0_j
 
 The first trial is the hand-set gains, so that the result is never worse on the plant it was tuned on; what it is worth
-shows on another motion with other noise. A trial whose robot runs away, or strays too far from its reference, is stopped
-there and counted; its cost is infinite, and the search keeps away from such gains.
+shows on another motion with other noise. A trial whose robot runs away, strays too far from its reference or rattles
+between its torque limits is stopped there and counted; its cost is infinite, and the search keeps away from it. The
+gains are as safe as the plant is true: what it lacks, as the elasticity of gears, cannot make them unstable there.
 
 Source: Bergstra, Bardenet, Bengio, Kégl, "Algorithms for hyper-parameter optimization", 2011 (tree-structured Parzen
 estimators); Akiba et al., "Optuna", 2019.

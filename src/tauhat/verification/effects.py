@@ -101,19 +101,23 @@ def _heat(view: JointView, probes: Probes) -> FloatArray:
     return np.asarray((view.temperature - view.temperature.mean()) * _own("dq", "sign")(view, probes))
 
 
+def _slope(values: FloatArray, step: float) -> FloatArray:
+    return np.asarray(np.gradient(values, step))
+
+
 def _delay(view: JointView, _: Probes) -> FloatArray:
-    return np.gradient(view.rows.predicted[view.joint], view.step)[None]
+    return _slope(view.rows.predicted[view.joint], view.step)[None]
 
 
 def _bending(view: JointView, _: Probes) -> FloatArray:
     load = view.rows.load[view.joint]
-    return np.gradient(np.gradient(load, view.step), view.step)[None]
+    return _slope(_slope(load, view.step), view.step)[None]
 
 
 def _play(view: JointView, _: Probes) -> FloatArray:
     load = view.rows.load[view.joint]
     side = np.tanh(load / max(_PLAY * float(np.sqrt(np.mean(load**2))), 1e-12))
-    return np.gradient(np.gradient(side, view.step), view.step)[None]
+    return _slope(_slope(side, view.step), view.step)[None]
 
 
 def _neighbours(view: JointView, probes: Probes) -> FloatArray:

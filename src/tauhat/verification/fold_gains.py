@@ -4,9 +4,9 @@ The residual `r` of one joint on one recording is cut into stretches of time. On
     |r - D u - C b|^2 + s^2 k |u|^2 / w^2
 is solved for b, the candidate's free coefficients, and for u, the error of the model's own parameters in deviations of
 their covariance (`D D'` is that of the predicted torque); the one left out judges. `s^2` is the variance of the
-residual, k how many rows one independent one is worth, and w by how many standard errors parameters may be off: 0, 1, 10
-or 100, whatever predicts best. So a column that the model has in other words gains nothing, and parameters that the
-fit has bent to make up for a missing effect are free to go back.
+residual, k how many rows one independent one is worth, and w by how many standard errors parameters may be off: none,
+one, 10 or 100, whatever predicts best. So a column that the model has in other words gains nothing, and parameters that
+the fit has bent to make up for a missing effect are free to go back.
 
 Source: ridge as prior knowledge, Hoerl, Kennard 1970; blocked cross-validation, Burman, Chow, Nolan 1994.
 """
@@ -21,6 +21,7 @@ from tauhat.arrays import FloatArray, IntArray
 
 WIDTHS = (1e-3, 1.0, 10.0, 100.0)  # standard errors that parameters may be off
 _SUREST = 1e-12  # standard error below which there is none
+_OPTIMISM = 2.5  # a residual looks shorter in memory after a fit than the noise behind it is
 _RIDGE = 1e-6  # of the columns' own squares: candidates that cannot be told from another
 
 
@@ -156,7 +157,7 @@ def chance_of_gain(before: FloatArray, after: FloatArray, *, columns: int, effec
     from scipy.special import fdtrc
 
     left, gained = float(after.sum()), float((before - after).sum())
-    free = max(effective - columns - 1.0, 1.0)
+    free = max(effective / _OPTIMISM - columns - 1.0, 1.0)
     return float(fdtrc(columns, free, gained / columns / max(left / free, np.finfo(float).tiny))) if gained > 0 else 1.0
 
 

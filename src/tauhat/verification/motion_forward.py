@@ -2,18 +2,19 @@
 
 Two ways, for the identified and for the description's own parameters beside each other:
 
-- `followed`: the simulated robot under the recorded one's law and reference. Where these are not known, the reference is
-  the measured motion and the law is tuned to the simulated robot, as `estimation.ClosedLoop` has it; every robot then
-  follows, and it is the torque it asks for, not its position, that tells models apart;
-- `driven`: the measured torque moves the simulated robot, and a weak law of `tether` Hz, the same for all, keeps it from
-  drifting away. What the torque lacks for the model to move as the robot did is a deviation of the position,
-  `about d tau / (D (2 pi tether)^2)` with D the inertia of the joint. No law needs to be known for that.
+- `followed`: the simulated robot under the recorded one's law and reference. Where these are not known, the reference
+  is the measured motion and the law is tuned to the simulated robot, as `estimation.ClosedLoop` has it; every robot
+  then follows, and it is the torque it asks for, not its position, that tells models apart;
+- `driven`: the measured torque moves the simulated robot, and a weak law of `tether` Hz keeps it from drifting away,
+  the same for all, tuned on every joint to the larger of both masses D. What the torque lacks for the model to move as
+  the robot did is a deviation of the position, about `d tau / (D (2 pi tether)^2)`. No law needs to be known for that.
 
 Without a model there is no robot to simulate.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -150,7 +151,7 @@ def forward_motion(
     if estimate.robot.has_inertia:
         models["nominal"] = estimate.base.projection @ nominal_parameters(estimate.model)
     run = following.runs[0]
-    held = _tether(driving, estimate.values)
+    held = _tether(driving, models.values())
     shown = _trusted(run)
     joints = estimate.robot.joints
     return ForwardMotion(
@@ -175,11 +176,13 @@ def _problem(estimate: Estimate, recording: Recording) -> Problem:
     return Problem(model=model, base=base, recordings=recordings, processing=processing, evidence=evidence)
 
 
-def _tether(driving: SimulatedRuns, values: FloatArray) -> Gains:
-    """Return the weak law, tuned to the identified masses."""
-    masses = driving.arm.masses(driving.standard(values))
-    law = driving.loop.law_for(driving.arm.model.robot, masses, driving.runs[0].q_ref)
-    return Gains(law.kp, law.kd, law.integral_gain, law.torque_limit)
+def _tether(driving: SimulatedRuns, models: Iterable[FloatArray]) -> Gains:
+    """Return the weak law, tuned on every joint to the largest of the models' masses: some have none at all."""
+    robot, run = driving.arm.model.robot, driving.runs[0]
+    masses = (driving.arm.masses(driving.standard(values)) for values in models)
+    laws = [driving.loop.law_for(robot, mass, run.q_ref) for mass in masses]
+    kp, kd = (np.max([getattr(law, name) for law in laws], axis=0) for name in ("kp", "kd"))
+    return Gains(kp, kd, np.zeros_like(kp), laws[0].torque_limit)
 
 
 def _followed(runs: SimulatedRuns, model: str, values: FloatArray) -> ForwardRun:

@@ -169,7 +169,7 @@ def compare_tracking(
 def tracking_contenders(
     estimate: Estimate, motion: Trajectory, *, settings: ExperimentSettings
 ) -> tuple[Contender, ...]:
-    """Return PD without model, with gravity, with feedforward and computed torque of both models, and adaptive tracking.
+    """Return PD, PD with gravity, feedforward and computed torque of both models, and adaptive tracking.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def _run(
     unread = np.random.default_rng(0)  # of the sensors of the log; what counts here is the true motion
     try:
         done = simulate(robot, motion, rng=unread, parameters=truth, settings=steered).truth
-    except SimulationError as error:
+    except SimulationError as failure:
         nothing = np.full(robot.n_v, np.nan)
         return TrackingRun(
             name=contender.name,
@@ -251,7 +251,7 @@ def _run(
             worst=nothing,
             effort=nothing,
             error=np.zeros((0, robot.n_v)),
-            failure=str(error),
+            failure=str(failure),
         )
     error = done.reference.q - done.q
     return TrackingRun(

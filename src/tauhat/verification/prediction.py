@@ -158,31 +158,35 @@ def predict_recording(estimate: Estimate, recording: Recording, *, processing: P
         for piece in predicted_rows(estimate, recording, processing=processing, probes=Kinematics())
     ]
     rows = joined(pieces, recording)
-    series = {name: _time_first(getattr(rows, name)) for name in ("tau", "predicted", "std", "load", "dq")}
-    error = series["tau"] - series["predicted"]
+    tau, predicted, std, dq = (_time_first(part) for part in (rows.tau, rows.predicted, rows.std, rows.dq))
     quantile = student_quantile(estimate.degrees)
-    bands = [
-        prediction_band(error[:, j], quantile * series["std"][:, j], level=float(estimate.joint_rms[j]))
-        for j in range(estimate.robot.n_v)
-    ]
-    joints = tuple(
-        _joint_error(joint, _Joint(rows.t, *(series[name][:, j] for name in ("tau", "predicted", "dq"))), bands[j])
-        for j, joint in enumerate(estimate.robot.joints)
-    )
+    joints = []
+    for j, joint in enumerate(estimate.robot.joints):
+        series = _Joint(rows.t, tau[:, j], predicted[:, j], dq[:, j])
+        band = prediction_band(series.error, quantile * std[:, j], level=float(estimate.joint_rms[j]))
+        joints.append(_joint_error(joint, series, band))
     temperature = temperature_at(recording, rows.t)
-    log = input_log(recording)
+    error, log = tau - predicted, input_log(recording)
+    moving = (np.abs(dq) > STANDSTILL * np.abs(dq).max(axis=0)).any(axis=1)
     return LogPrediction(
         log=log.name,
         input=log,
-        joints=joints,
-        **_overall(error, series["tau"], series["dq"]),
+        relative_rms=_ratio(error, tau),
+        rms=float(np.sqrt(np.mean(error**2))),
+        r2=_r2(error, tau),
+        moving_relative_rms=_ratio(error[moving], tau[moving]),
+        joints=tuple(joints),
         t=read_only(rows.t),
+        tau=tau,
+        predicted=predicted,
+        dq=dq,
         q=_time_first(np.array([own[0] for own in rows.probes])),
         ddq=_time_first(np.array([own[1] for own in rows.probes])),
+        load=_time_first(rows.load),
+        std=std,
         level=estimate.joint_rms,
         quantile=quantile,
         temperature=None if temperature is None else read_only(temperature),
-        **series,
     )
 
 
@@ -194,19 +198,14 @@ class _Joint(NamedTuple):
     predicted: FloatArray
     dq: FloatArray
 
+    @property
+    def error(self) -> FloatArray:
+        """Measured less predicted torque, (n,)."""
+        return self.tau - self.predicted
+
 
 def _time_first(rows: FloatArray) -> FloatArray:
     return np.asarray(read_only(np.ascontiguousarray(rows.T)))
-
-
-def _overall(error: FloatArray, tau: FloatArray, dq: FloatArray) -> dict[str, float]:
-    moving = (np.abs(dq) > STANDSTILL * np.abs(dq).max(axis=0)).any(axis=1)
-    return {
-        "relative_rms": _ratio(error, tau),
-        "rms": float(np.sqrt(np.mean(error**2))),
-        "r2": _r2(error, tau),
-        "moving_relative_rms": _ratio(error[moving], tau[moving]),
-    }
 
 
 def _ratio(error: FloatArray, tau: FloatArray) -> float:
@@ -220,8 +219,8 @@ def _r2(error: FloatArray, tau: FloatArray) -> float:
 
 
 def _joint_error(joint: Joint, series: _Joint, band: PredictionBand) -> JointError:
-    t, tau, predicted, dq = series
-    error = tau - predicted
+    t, tau, _, dq = series
+    error = series.error
     speed = np.abs(dq)
     top = float(speed.max())
     in_time = np.array_split(error, PARTS)

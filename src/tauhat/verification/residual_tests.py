@@ -22,9 +22,9 @@ from tauhat.estimation.estimate import Estimate
 from tauhat.recordings.choice import top_speeds
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
-from tauhat.verification.joint_search import Effect, JointCase, Search, changes, named, no_columns
 from tauhat.verification.effects import JointView, candidates
 from tauhat.verification.fold_gains import passing
+from tauhat.verification.joint_search import Effect, JointCase, Search, changes, named, no_columns
 from tauhat.verification.probes import ORDERS, Probes
 from tauhat.verification.series import (
     PredictedRows,
@@ -145,7 +145,7 @@ def _log_residuals(
             "too short to look at the residuals", where=recording.name, expected=f"{_FEWEST_ROWS} rows or more",
             got=f"{rows.t.size} at {processing.cutoff:g} Hz", remedy="a longer recording, or a higher --cutoff",
         )  # fmt: skip
-    cases = [_case(estimate, recording, rows, joint, processing) for joint in range(estimate.robot.n_v)]
+    cases = [_case(estimate, rows, joint, processing) for joint in range(estimate.robot.n_v)]
     present = _present(estimate)
     searches = [
         Search.of(case, candidates(_view(recording, rows, joint), probes, present)) for joint, case in enumerate(cases)
@@ -171,9 +171,7 @@ def _joint(
     )  # fmt: skip
 
 
-def _case(
-    estimate: Estimate, recording: Recording, rows: PredictedRows, joint: int, processing: Processing
-) -> JointCase:
+def _case(estimate: Estimate, rows: PredictedRows, joint: int, processing: Processing) -> JointCase:
     residual = rows.tau[joint] - rows.predicted[joint]
     step = _step(rows)
     facts = estimate.robot.joints[joint]

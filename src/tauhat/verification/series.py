@@ -20,6 +20,8 @@ from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot
 
+_FLAT = ("t", "tau", "predicted", "std", "load", "dq")
+
 
 class PredictedRows(NamedTuple):
     """Consecutive filtered, decimated rows and what the model says about them; joints first, (n_v, n) each.
@@ -60,8 +62,9 @@ class Kinematics(Term):
     def columns(
         self, robot: Robot, motion: Motion, state: FloatArray | None
     ) -> tuple[tuple[FloatArray, ...], FloatArray | None]:
-        """Return q and ddq."""
-        return tuple(np.stack([q, ddq]) for q, ddq in zip(motion.q, motion.ddq, strict=True)), state
+        """Return q and ddq; pointwise."""
+        pairs = [(motion.q[joint], motion.ddq[joint]) for joint in range(robot.n_v)]
+        return tuple(np.stack(pair) for pair in pairs), state
 
 
 def probe_parameters(robot: Robot, width: int) -> tuple[Parameter, ...]:
@@ -164,15 +167,12 @@ def joined(pieces: list[PredictedRows], recording: Recording) -> PredictedRows:
     """
     if not pieces:
         raise ModelError("no row of the recording is left to verify on", where=recording.name)
-    flat = {
-        name: np.concatenate([getattr(piece, name) for piece in pieces], axis=-1)
-        for name in ("t", "tau", "predicted", "std", "load", "dq")
-    }
-    deep = {
-        name: tuple(np.concatenate(parts, axis=1) for parts in zip(*(getattr(p, name) for p in pieces), strict=True))
-        for name in ("own", "probes")
-    }
-    return PredictedRows(**flat, **deep)
+    flat = {name: np.concatenate([getattr(piece, name) for piece in pieces], axis=-1) for name in _FLAT}
+    own, probes = (
+        tuple(np.concatenate(parts, axis=1) for parts in zip(*several, strict=True))
+        for several in ([piece.own for piece in pieces], [piece.probes for piece in pieces])
+    )
+    return pieces[0]._replace(**flat, own=own, probes=probes)
 
 
 def temperature_at(recording: Recording, t: FloatArray) -> FloatArray | None:

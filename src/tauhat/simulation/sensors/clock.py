@@ -17,7 +17,7 @@ def sampling_instants(errors: SensorErrors, ticks: FloatArray, rng: np.random.Ge
         return ticks
     _refuse_overtaking(errors, ticks)
     off = errors.sampling_jitter * _HALF_WIDTH * rng.uniform(-1.0, 1.0, ticks.size)
-    return np.clip(ticks + off, ticks[0], ticks[-1])
+    return np.asarray(np.clip(ticks + off, ticks[0], ticks[-1]))
 
 
 def time_stamps(

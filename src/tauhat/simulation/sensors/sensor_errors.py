@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -124,9 +124,10 @@ class SensorErrors:
         if not 0.0 <= factor < np.inf:
             raise SimulationError("scale of sensor errors", expected="a number >= 0", got=factor)
         noise = self.velocity_noise
+        scaled: dict[str, Any] = {name: factor * np.asarray(getattr(self, name)) for name in _SCALED}
         return replace(
             self,
-            **{name: factor * np.asarray(getattr(self, name)) for name in _SCALED},
+            **scaled,
             velocity_noise=None if noise is None else factor * np.asarray(noise),
             torque_factor=1.0 + factor * (np.asarray(self.torque_factor) - 1.0),
             ripples=tuple(ripple.scaled(factor) for ripple in self.ripples),

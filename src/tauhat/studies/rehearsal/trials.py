@@ -9,22 +9,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.dynamics.model import torque_model
+from tauhat.dynamics.model import PLAIN_TERMS, torque_model
 from tauhat.errors import TauhatError, TauhatWarning
 from tauhat.estimation.estimate import Estimate
 from tauhat.estimation.estimators import estimator_named
 from tauhat.estimation.identify import identify
 from tauhat.excitation.trajectory import Trajectory
+from tauhat.recordings.log import Log
+from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 from tauhat.robots.robot import Robot
 from tauhat.simulation.experiment import ExperimentSettings, Simulation, Truth, logged, simulate
 from tauhat.simulation.parameters import TrueParameters
 from tauhat.simulation.planned_experiment import PlannedExperiment
 from tauhat.simulation.sensors import SensorErrors
+from tauhat.verification.checked_log import checked_log
 from tauhat.verification.prediction import predict_recording, verify
 from tauhat.verification.truth import standard_parameters
 
 CONFIDENCE = 0.95
+BAND = 10.0  # [Hz] below which errors against the truth are judged
+_MOTION_BAND = 40.0  # [Hz] to which the true speed is differentiated for it
+_OF_RATE = 0.2  # of the log's rate, at most
 _STREAM = 20261122  # of all random numbers of a rehearsal
 _TRUTH, _SENSORS, _FITTED, _UNSEEN = range(4)
 
@@ -62,22 +68,23 @@ class Trial:
 class Outcome:
     """What became of one robot, one motion and one kind of sensors.
 
-    error : norm of the predicted less the true torque over that of the true, on the unseen motion, all joints stacked
-    in_scale : the same in the drives' own scale: against the true torque times the wrong factors of the sensors, which
-        no log of that robot can tell
+    error : norm of the predicted less the true torque over that of the true, below 10 Hz on the unseen motion, all
+        joints stacked
+    as_sensed : the same against the true torque with the constant errors of the sensors, factors and offsets, which no
+        log of that robot can tell
     on_log : as `tauhat verify` shows it, against the unseen motion's log
     joints : error joint by joint
     inside : share of the base parameters whose 95 % intervals hold the truth
     condition : condition number of the fit
     failure : why there is no model; all figures are nan then
-    doubts : what the library warned of
+    doubts : what the library warned of, and for the first robot what `tauhat check` does
     """
 
     seed: int
     seconds: float
     sensors: str
     error: float = float("nan")
-    in_scale: float = float("nan")
+    as_sensed: float = float("nan")
     on_log: float = float("nan")
     joints: tuple[float, ...] = ()
     inside: float = float("nan")
@@ -121,7 +128,7 @@ def _of_motion(trial: Trial, motion: Trajectory, *, unseen: Truth, doubts: tuple
                 outcome = _outcome(trial, sensors, truth, unseen=unseen)
             except TauhatError as error:
                 outcome = _failed(trial, motion, sensors, error)
-        found = dict.fromkeys((*doubts, *_words(heard)))
+        found = dict.fromkeys((*doubts, *outcome.doubts, *_words(heard)))
         yield replace(outcome, seconds=motion.duration, doubts=tuple(found))
 
 
@@ -135,21 +142,46 @@ def _outcome(trial: Trial, sensors: NamedSensors, fitted: Truth, *, unseen: Trut
     model = torque_model(robot, trial.terms)
     estimate = identify(model, [log], estimator=estimator_named(trial.estimator))
     clean = _clean(robot, unseen, settings)
-    # A log's delay is of its channels; the truth has none.
-    processing = replace(estimate.processing, delay=0.0)
+    processing = _judge(settings.sample_rate)
     against_truth = predict_recording(estimate, clean, processing=processing)
-    scaled = replace(clean, tau=np.asarray(errors.torque_factor) * _torque(unseen, settings))
+    constant = np.asarray(errors.torque_factor) * _torque(unseen, settings) + np.asarray(errors.torque_offset)
+    doubts = _checked(robot, log) if trial.seed == 0 else ()
     return Outcome(
         seed=trial.seed,
         seconds=0.0,
         sensors=sensors.name,
         error=against_truth.relative_rms,
-        in_scale=predict_recording(estimate, scaled, processing=processing).relative_rms,
+        as_sensed=predict_recording(estimate, replace(clean, tau=constant), processing=processing).relative_rms,
         on_log=verify(estimate, [seen.recording]).logs[0].relative_rms,
         joints=tuple(joint.relative_rms for joint in against_truth.joints),
         inside=_share_inside(estimate, unseen.parameters, errors),
         condition=estimate.condition,
+        doubts=doubts,
     )
+
+
+def _judge(rate: float) -> Processing:
+    """Return the filters of all errors against the truth: the same band for good and bad logs, speeds as they are."""
+    return Processing(
+        cutoff=min(BAND, _OF_RATE * rate),
+        motion_cutoff=min(_MOTION_BAND, 2.0 * _OF_RATE * rate),
+        velocity="velocity",
+    )
+
+
+def _checked(robot: Robot, recording: Recording) -> tuple[str, ...]:
+    """Return what `tauhat check` would warn of."""
+    log = Log(
+        t=recording.t,
+        q=recording.q,
+        dq=recording.dq,
+        tau=recording.tau,
+        joint_names=robot.joint_names,
+        units=tuple(joint.unit for joint in robot.joints),
+        path="log",
+    )
+    findings = checked_log(log, robot=robot, terms=PLAIN_TERMS).findings
+    return tuple(f"check: {found.message}" for found in findings if found.severity in {"error", "warning"})
 
 
 def _run(robot: Robot, motion: Trajectory, truth: TrueParameters, settings: ExperimentSettings) -> Truth:
