@@ -2,8 +2,8 @@
 
     python benchmarks/residual_tests.py [--json] [--robot two_link] [--seeds 20] [--seconds 20] [--noise 0.03]
 
-False alarms: the plant has what the model has, with white torque noise and with noise that is correlated over 1 s; counted is the
-share of recordings on which anything is named. Power: the plant has one effect that the model lacks; counted is the
+False alarms: the plant has what the model has, with white torque noise and with noise that is correlated; counted is
+the share of recordings on which anything is named. Power: the plant has one effect that the model lacks; counted is the
 share of recordings on which it is the first that is named on some joint, and named anywhere. Every seed is a new plant,
 a motion to fit and another motion to judge.
 """
@@ -38,6 +38,7 @@ from tauhat.verification import LogResiduals, residual_tests
 
 PLAIN = "inertia,rotor,viscous,coulomb,offset"
 SAMPLE_RATE = 250.0
+MEMORY = {"right model, noise of 0.2 s": 0.2, "right model, noise of 1 s": 1.0}  # [s]
 
 
 class Case(NamedTuple):
@@ -50,6 +51,7 @@ class Case(NamedTuple):
 
 CASES = {
     "right model, white noise": Case("plain", PLAIN, ()),
+    "right model, noise of 0.2 s": Case("plain", PLAIN, ()),
     "right model, noise of 1 s": Case("plain", PLAIN, ()),
     "offset": Case("offset", "inertia,rotor,viscous,coulomb", ("constant",)),
     "viscous": Case("plain", "inertia,rotor,coulomb,offset", ("viscous friction", "degressive friction")),
@@ -136,7 +138,7 @@ def noisy(recording: Recording, rng: np.random.Generator, *, level: float, memor
 def tested(name: str, case: Case, robot: Robot, seed: int, options: argparse.Namespace) -> LogResiduals:
     rng = np.random.default_rng(1000 * list(CASES).index(name) + seed)
     truth = plant_of(case.plant, robot, rng)
-    memory = 1.0 if name.endswith("1 s") else 0.0
+    memory = MEMORY.get(name, 0.0)
     runs = [noisy(run(robot, case.plant, truth, rng, options), rng, level=options.noise, memory=memory) for _ in "ab"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TauhatWarning)

@@ -26,8 +26,10 @@ from tauhat.cli.app import app
 from tauhat.dynamics import load_model
 from tauhat.estimation.constraints_file import load_constraints
 from tauhat.excitation import load_limits
+from tauhat.project import load_project
 from tauhat.recordings import load_map
 from tauhat.robots import Robot, builtin_names, load_robot, robot_from_dh
+from tauhat.simulation.experiment_file import load_experiment
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")])
@@ -196,6 +198,8 @@ TOML_KINDS: Mapping[str, Callable[[dict[str, Any]], bool]] = {
     "map": lambda data: "time" in data and "position" in data,
     "model": lambda data: "term" in data,
     "constraints": lambda data: "link" in data or "pull" in data,
+    "experiment": lambda data: isinstance(data.get("robot"), str) and "joints" not in data,
+    "project": lambda data: isinstance(data.get("robot"), dict),
     "limits": lambda data: bool({"collision", "tool", "start", "planes", "boxes"} & set(data)),
 }
 TOML_READERS: Mapping[str, Callable[[Path], object]] = {
@@ -203,6 +207,8 @@ TOML_READERS: Mapping[str, Callable[[Path], object]] = {
     "map": load_map,
     "model": lambda path: load_model(path, arm_of(path)),
     "constraints": load_constraints,
+    "experiment": load_experiment,
+    "project": load_project,
     "limits": lambda path: load_limits(path, load_robot("ur5e")),
 }
 

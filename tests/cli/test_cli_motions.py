@@ -98,6 +98,20 @@ def test_a_simulated_robot_follows_a_designed_motion(tauhat: Tauhat, motion: Pat
     assert "own length" in " ".join(other.stderr.split())
 
 
+def test_the_map_of_the_logs_in_a_folder_is_not_for_what_tauhat_wrote_there(
+    tauhat: Tauhat, motion: Path, tmp_path: Path
+) -> None:
+    text = '[time]\ncolumn = 0\n[position]\ncolumns = "{1..2}"\nunit = "deg"\n[torque]\ncolumns = [3, 4]\n'
+    (tmp_path / "map.toml").write_text(text)
+    made("excite", "two_link", "-o", tmp_path / "motion.csv", *QUICK)
+    made("simulate", "two_link", "--motion", tmp_path / "motion.csv", "-o", tmp_path / "run.parquet")
+    run = read_recording(tmp_path / "run.parquet")
+    assert run.tau is not None
+    assert np.abs(run.q[-1] - read_recording(motion).q[-1]).max() < 0.02
+    (tmp_path / "run.map.toml").write_text(text)
+    assert np.allclose(read_recording(tmp_path / "run.parquet").q, np.deg2rad(run.q))
+
+
 def test_motions_of_another_robot_and_files_that_hold_none_are_refused(
     tauhat: Tauhat, workshop: Workshop, motion: Path, tmp_path: Path
 ) -> None:

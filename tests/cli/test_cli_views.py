@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,19 @@ def test_identify_shows_friction_with_units_and_the_next_command(
     words = " ".join(text.split())
     assert "Terms: inertia, rotor, viscous, coulomb, offset." in words
     assert "13 of 13 base parameters determined" in words
+
+
+def test_parameters_that_were_dropped_are_not_counted_as_known(
+    tauhat: Tauhat, workshop: Workshop, tmp_path: Path
+) -> None:
+    words = ("identify", "two_link", workshop.log, "-o", tmp_path / "e.json", "--rows", "0:300", "--model", "plain")
+    for more, instead in (((), "are zero"), (("--physical",), "are as small as possible bodies allow")):
+        text = " ".join(tauhat(*words, "--essential", *more).stdout.split())
+        found = re.search(r"(\d+) of 13 base parameters determined, (\d+) of them", text)
+        assert found is not None
+        fitted, known = map(int, found.groups())
+        assert known <= fitted < 13
+        assert instead in text
 
 
 def test_friction_shown_is_that_of_the_estimate_whatever_terms_make_it(
@@ -92,6 +106,7 @@ def test_aligned_numbers_show_two_digits_of_the_smallest() -> None:
     assert aligned([123.4, 567.8]) == ["123", "568"]
     assert aligned([1.23456, 2.0], like=[0.01, 0.5]) == ["1.235", "2.000"]
     assert aligned([math.inf, 0.0, 1.0]) == ["–", "0.0", "1.0"]
+    assert aligned([5.427e25, 12.0]) == ["5e+25", "12"]
 
 
 @pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])

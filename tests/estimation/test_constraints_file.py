@@ -75,5 +75,6 @@ def test_each_mistake_is_one_line(tmp_path, text, message):
 
 
 def test_a_missing_file_is_told(tmp_path):
-    with pytest.raises(ModelError, match=r"none\.toml"):
+    with pytest.raises(ModelError, match=r"none\.toml") as caught:
         load_constraints(tmp_path / "none.toml")
+    assert str(caught.value).count("none.toml") == 1

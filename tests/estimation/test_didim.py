@@ -73,7 +73,7 @@ def test_a_law_that_does_not_follow_the_log_stops_with_a_reason():
         DirectInverse(loop=ClosedLoop(law=weak)).fit_problem(problem(log))
 
 
-def test_first_values_that_move_no_robot_are_replaced_by_the_nominal_ones():
+def test_first_values_that_move_no_robot_are_replaced_by_those_of_consistent_bodies():
     arm = driven()
     noisy = problem(arm.recording(np.random.default_rng(0), position=5e-3))
     runs = simulated_runs(noisy, arm.loop)
@@ -93,10 +93,27 @@ class Misled(DirectInverse):
         return found._replace(values=-1e3 * found.values) if misled else found
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lost(Misled):
+    """The same, and no consistent bodies fit either."""
+
+    def linear_problem(self, runs, found):  # noqa: ARG002
+        raise ModelError("no bodies")
+
+
+def test_values_that_move_no_robot_give_way_to_those_of_consistent_bodies():
+    arm = driven()
+    log = arm.recording(np.random.default_rng(0), position=1e-4)
+    solution = Misled(loop=arm.loop, most_passes=1).fit_problem(problem(log))
+    assert solution.cause.endswith("values of consistent bodies, because the free ones move no robot")
+    assert np.abs(solution.values - arm.values).max() < 0.01 * np.abs(arm.values).max()
+    assert solution.passes == 1
+
+
 def test_passes_that_lead_to_no_robot_begin_again_at_the_nominal_one():
     arm = driven()
     log = arm.recording(np.random.default_rng(0), position=1e-4)
-    solution = Misled(loop=arm.loop).fit_problem(problem(log))
+    solution = Lost(loop=arm.loop).fit_problem(problem(log))
     assert solution.cause.startswith("converged after")
     assert np.abs(solution.values - arm.values).max() < 0.01 * np.abs(arm.values).max()
 

@@ -109,6 +109,12 @@ def test_a_reversed_torque_warns_that_friction_is_negative():
         identify(TRUTH.model, [replace(recording, tau=-recording.tau)], processing=SETTINGS)
 
 
+def test_one_reversed_torque_warns_of_its_joint():
+    recording = TRUTH.recording()
+    with pytest.warns(TauhatWarning, match=r"friction is negative on 1 of 2 joints \(j2\).*one value a joint"):
+        identify(TRUTH.model, [replace(recording, tau=recording.tau * [1.0, -1.0])], processing=SETTINGS)
+
+
 def test_a_rich_motion_with_the_right_sign_does_not_warn():
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -12,7 +12,7 @@ from loaded_arms import ABOUT, CENTRE, EMPTY, MASS, PAYLOAD, SETTINGS, carrying,
 from sample_arms import Truth, motion_from_rest, random_inertia
 from tauhat.dynamics import inverse_dynamics, torque_model
 from tauhat.dynamics.terms import LoadCoulomb
-from tauhat.errors import ModelError, RecordingError
+from tauhat.errors import ModelError, RecordingError, TauhatWarning
 from tauhat.estimation import Estimate, identify, load_estimate, payload_fit
 from tauhat.estimation.payload import KnownPayload, Payload, identify_payload
 from tauhat.estimation.payload_body import central_jacobian
@@ -159,6 +159,15 @@ def test_the_physical_body_is_one_where_the_free_fit_is_none():
     assert margins(payload.values) >= 0.99e-6
     assert payload.relative_rms > payload.free_relative_rms
     assert not payload.body.inertia_seen[2][2]
+
+
+def test_torque_that_no_payload_explains_warns_of_its_joint():
+    estimate = identify(EMPTY.model, [measured(EMPTY, seed=0, size=0.1)], processing=SETTINGS)
+    after = measured(LOADED, seed=1000, size=0.1)
+    drag = 4.0 * np.tanh(np.gradient(after.q[:, 1], after.t) / 0.05)
+    worn = replace(after, tau=after.tau + np.column_stack([np.zeros_like(drag), drag]))
+    with pytest.warns(TauhatWarning, match=rf"{EMPTY.model.robot.joint_names[1]} \d+ % of it.*--unloaded"):
+        identify_payload(estimate, [worn])
 
 
 def test_a_possible_body_does_not_warn():

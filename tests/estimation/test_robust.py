@@ -160,7 +160,7 @@ def test_physical_constraints_are_solved_on_the_weighted_rows():
 def test_why_it_ended_is_told():
     problem = problem_of(with_spikes(run(0), 0))
     solution = HuberLeastSquares().fit_problem(problem)
-    assert solution.cause.startswith("converged: the last one moved the torque by")
+    assert solution.cause.startswith("converged: the last pass moved the torque by")
     assert "5." in solution.advice or "4." in solution.advice
     assert "% of the torque samples were spikes and mended" in solution.advice
     assert HuberLeastSquares().fit_problem(problem_of(run(0))).advice == ""

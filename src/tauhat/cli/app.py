@@ -13,6 +13,7 @@ import typer
 import tauhat
 from tauhat.cli.adapter import as_command
 from tauhat.cli.commands import (
+    budget,
     calibrate_drives,
     check,
     compare,
@@ -50,6 +51,7 @@ app.command("check")(as_command(check.run, check.Options))
 app.command("excite")(as_command(excite.run, excite.Options))
 app.command("simulate")(as_command(simulate.run, simulate.Options))
 app.command("rehearse")(as_command(rehearse.run, rehearse.Options))
+app.command("budget")(as_command(budget.run, budget.Options))
 app.command("identify")(as_command(identify.run, identify.Options))
 app.command("verify")(as_command(verify.run, verify.Options))
 app.command("payload")(as_command(payload.run, payload.Options))

@@ -48,8 +48,9 @@ def load_constraints(path: str | Path) -> PhysicalConstraints:
     ModelError
         when the file cannot be read, a key is unknown or a value is not possible.
     """
+    text = read_text(Path(path), error=ModelError, largest=_LARGEST_FILE)
     try:
-        data = tomllib.loads(read_text(Path(path), error=ModelError, largest=_LARGEST_FILE))
+        data = tomllib.loads(text)
         top = _known(data, ("margin", "least_mass", "unbounded", "pull", "link"), "top level")
         settings = {key: top[key] for key in ("margin", "least_mass", "unbounded") if key in top}
         links = tuple(_link(table) for table in top.get("link", ()))

@@ -30,6 +30,7 @@ from tauhat.recordings.recording import Recording
 
 _DEAR = 0.02  # share of the residual that constraints may cost before the bound on rotor inertias is looked at
 _ROTOR = "Ia"
+_SURE = 5.0  # standard errors below zero at which the friction of a single joint surely is negative
 DOUBTFUL_CONDITION = 300.0  # scaled condition number above which a motion does not support its model
 
 
@@ -210,15 +211,19 @@ def _warn_of_still_joints(seen: Seen) -> None:
 
 
 def _warn_of_negative_friction(estimate: Estimate, seen: Seen) -> None:
-    """Warn when friction drives most joints at both a fifth and three fifths of their top speeds."""
-    speeds = np.maximum(seen.top_speeds, np.finfo(float).tiny)
-    levels = [estimate.friction(part * speeds).torque for part in (0.2, 0.6)]
-    negative = np.flatnonzero((np.array(levels) < 0.0).all(axis=0))
-    if negative.size > estimate.robot.n_v / 2:
-        numbers = ", ".join(estimate.robot.joint_names[joint] for joint in negative)
+    """Warn when friction drives most joints, or single ones surely, at a fifth and three fifths of their top speeds."""
+    speeds, n_v = np.maximum(seen.top_speeds, np.finfo(float).tiny), estimate.robot.n_v
+    levels = [estimate.friction(part * speeds) for part in (0.2, 0.6)]
+    negative = np.all([level.torque < 0.0 for level in levels], axis=0)
+    surely = np.all([level.torque < -_SURE * level.standard_errors for level in levels], axis=0)
+    most = bool(negative.sum() > n_v / 2)
+    joints = np.flatnonzero(negative if most else surely)
+    if joints.size:
+        names = ", ".join(estimate.robot.joint_names[joint] for joint in joints)
+        remedy = "set `sign = -1`" if most else "`sign` takes one value a joint"
         warnings.warn(
-            f"friction is negative on {negative.size} of {estimate.robot.n_v} joints ({numbers}): the torque is "
-            "probably logged with the sign reversed; set `sign = -1` in the map's [torque] section",
+            f"friction is negative on {joints.size} of {n_v} joints ({names}): the torque is "
+            f"probably logged with the sign reversed; {remedy} in the map's [torque] section",
             TauhatWarning,
             stacklevel=4,
         )

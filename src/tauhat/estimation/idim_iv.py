@@ -71,6 +71,10 @@ class InstrumentalVariables(SimulationEstimator):
         rows = _weighted(paired, paired.total, weights)
         return Found(_solved(_projected(rows)), weights, paired)
 
+    def linear_problem(self, runs: SimulatedRuns, found: Found) -> Evidence:
+        """Return the orthogonality conditions of every joint, in the form of least squares."""
+        return _projected_evidence(runs.problem.evidence, found.evidence, found.values)
+
     def solution(self, runs: SimulatedRuns, tried: Tried, found: Found, ending: tuple[int, str, str]) -> Solution:
         """Return values and sandwich error bars of the last instruments."""
         passes, cause, advice = ending

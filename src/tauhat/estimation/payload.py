@@ -33,6 +33,8 @@ from tauhat.recordings.recording import Recording
 
 _MOMENTS = (4, 6, 9)  # Ixx, Iyy, Izz among the ten
 _ROUNDING = 1e-6  # relative half-width of the bounds that stand for a known mass
+_MISFIT = 0.25  # residual over torque of a joint from which no payload explains it
+_WORSE = 4.0  # times the residual in the fit of the arm alone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -194,7 +196,8 @@ def identify_payload(
     Warns
     -----
     TauhatWarning
-        when a moment of inertia comes out negative by more than its error: torque gains or the model are off.
+        when a moment of inertia comes out negative by more than its error: torque gains or the model are off; or when
+        a joint is predicted far worse than in the fit of the arm alone.
     """
     if not loaded:
         raise ModelError("no recording with a payload")
@@ -216,6 +219,8 @@ def identify_payload(
     values = physical_payload(estimate, hung, fit.payload_evidence(), fit.free, mass=facts.bounds, centre=facts.centre)
     payload = _payload(fit, values, carrying_estimate(fit, values, [*unloaded, *loaded], settings))
     _warn_of_negative_inertia(payload)
+    if not unloaded:
+        _warn_of_misfit(payload, estimate)
     return payload
 
 
@@ -237,6 +242,21 @@ def _payload(fit: PayloadFit, values: FloatArray, loaded: Estimate) -> Payload:
         pure=hung.pure,
         loaded=loaded,
     )
+
+
+def _warn_of_misfit(payload: Payload, arm: Estimate) -> None:
+    """Warn of joints whose torque the arm's estimate does not hold for any more, whatever the payload is."""
+    left = payload.free_joint_rms / np.maximum(payload.torque_rms, np.finfo(float).tiny)
+    joints = np.flatnonzero((left > _MISFIT) & (payload.free_joint_rms > _WORSE * arm.joint_rms))
+    if joints.size:
+        shares = ", ".join(f"{arm.robot.joint_names[joint]} {100 * left[joint]:.0f} %" for joint in joints)
+        warnings.warn(
+            f"no payload explains the torque of the loaded run: {shares} of it are left, far more than in the fit of "
+            "the arm; its friction there does not hold with a load: give unloaded recordings as well (--unloaded), or "
+            "an estimate of a longer recording",
+            TauhatWarning,
+            stacklevel=3,
+        )
 
 
 def _warn_of_negative_inertia(payload: Payload) -> None:

@@ -186,7 +186,7 @@ class ReweightedLeastSquares(Estimator, ABC):
 
     def _cause(self, found: Reweighted) -> str:
         ended = "converged" if found.moved <= self.tolerance else f"stopped after {found.passes} passes"
-        return f"{ended}: the last one moved the torque by {100 * found.moved:.2g} % of its residual"
+        return f"{ended}: the last pass moved the torque by {100 * found.moved:.2g} % of its residual"
 
     def _advice(self, rows: RepeatedRows, found: Reweighted, spikes: float) -> str:
         lost = np.zeros_like(found.scales)

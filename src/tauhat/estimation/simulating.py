@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any, NamedTuple
@@ -19,12 +20,14 @@ from tauhat.errors import ModelError, SimulationError
 from tauhat.estimation.closed_loop import ClosedLoop
 from tauhat.estimation.evidence import Evidence, evidence_from_rows
 from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows
+from tauhat.estimation.physical import consistent
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.rows import Rows
 from tauhat.estimation.simulated_runs import SimulatedRuns, simulated_runs
 from tauhat.estimation.solution import Solution, joint_residuals
 
 _HALVINGS = 4  # of a pass whose parameters move no robot, before it is given up
+_PHYSICAL = "; values of consistent bodies, because the free ones move no robot"
 _UNKNOWN_LOOP = "give the robot's own law, gains and reference; without them the simulation is not the recorded motion"
 
 
@@ -140,14 +143,15 @@ class SimulationEstimator(Estimator):
             found = self.improved(runs, tried)
             before = tried
             try:
-                tried = self._step(runs, before, found)
+                wanted, tried = self._step(runs, before, found)
             except (ModelError, SimulationError) as error:
                 stopped = True
                 cause, advice = f"stopped in pass {passes}: {error.what} ({error.where})", _UNKNOWN_LOOP
             else:
-                steps = (values - before.values for values in (found.values, tried.values))
+                steps = (values - before.values for values in (wanted, tried.values))
                 asked, moved = (torque_change(runs.problem.evidence, step, before.values) for step in steps)
                 cause, advice = self._reason(passes, asked, moved)
+                cause += _PHYSICAL if cause and wanted is not found.values else ""
         return _Passed(tried, found, passes, cause=cause, advice=advice, stopped=stopped)
 
     @abstractmethod
@@ -162,32 +166,41 @@ class SimulationEstimator(Estimator):
         """Return whether a step is taken as it is, or halved; every step that can be simulated by default."""
         return True
 
-    def _first(self, runs: SimulatedRuns) -> Tried:
-        """Return the values of least squares, or the nominal ones where those move no robot."""
-        problem = runs.problem
-        values = self.inner.solve(problem.evidence).values
-        try:
-            return tried_in(runs, values)
-        except (ModelError, SimulationError) as error:
-            nominal = problem.base.projection @ _nominal(problem)
-            try:
-                return tried_in(runs, nominal)
-            except (ModelError, SimulationError):
-                raise error from None
+    def linear_problem(self, runs: SimulatedRuns, found: Found) -> Evidence:  # noqa: ARG002
+        """Return the evidence of the last pass, to be solved once more under the constraints of physics."""
+        return found.evidence
 
-    def _step(self, runs: SimulatedRuns, tried: Tried, found: Found) -> Tried:
-        """Return the values found, or as far on the way to them as a robot moves with them."""
-        for halving in range(_HALVINGS + 1):
-            values = tried.values + (found.values - tried.values) / 2**halving
-            try:
-                after = tried_in(runs, values)
-            except (ModelError, SimulationError):
-                if halving == _HALVINGS:
-                    raise
-                continue
-            if self.accepts(runs, tried, after):
-                return after
-        return tried
+    def _first(self, runs: SimulatedRuns) -> Tried:
+        """Return the values of least squares; consistent or nominal ones where these move no robot."""
+        problem = runs.problem
+        solved = self.inner.solve(problem.evidence)
+        try:
+            return tried_in(runs, solved.values)
+        except (ModelError, SimulationError) as error:
+            reason = error
+        with suppress(ModelError, SimulationError):
+            return tried_in(runs, _consistent(problem, problem.evidence, solved.weights))
+        with suppress(ModelError, SimulationError):
+            return tried_in(runs, problem.base.projection @ _nominal(problem))
+        raise reason
+
+    def _step(self, runs: SimulatedRuns, tried: Tried, found: Found) -> tuple[FloatArray, Tried]:
+        """Return the values wanted, (n_b,), and those that a robot moves with.
+
+        Wanted are the values found or, where these move no robot, those of consistent bodies that fit as well as such
+        can; tried is as far on the way to them as a robot moves and the method accepts.
+        """
+        wanted, after = found.values, _moving(runs, found.values)
+        if after is None:
+            with suppress(ModelError):
+                wanted = _consistent(runs.problem, self.linear_problem(runs, found), found.weights)
+                after = _moving(runs, wanted)
+        for halving in range(1, _HALVINGS + 1):
+            if after is not None and self.accepts(runs, tried, after):
+                return wanted, after
+            values = tried.values + (wanted - tried.values) / 2**halving
+            after = tried_in(runs, values) if halving == _HALVINGS else _moving(runs, values)
+        return wanted, after if after is not None and self.accepts(runs, tried, after) else tried
 
     def _reason(self, passes: int, asked: float, moved: float) -> tuple[str, str]:
         """Return cause and advice, empty while passes go on; a step that was only taken in part has not converged."""
@@ -224,6 +237,14 @@ def tried_in(runs: SimulatedRuns, values: FloatArray) -> Tried:
     return Tried(values, tuple(motions))
 
 
+def _moving(runs: SimulatedRuns, values: FloatArray) -> Tried | None:
+    """Return the motions with these parameters; None where they move no robot."""
+    try:
+        return tried_in(runs, values)
+    except (ModelError, SimulationError):
+        return None
+
+
 def merged_evidence(runs: SimulatedRuns, pieces: Iterable[Rows]) -> Evidence:
     """Return the evidence of one piece of rows a recording."""
     parts = (
@@ -244,6 +265,11 @@ def torque_change(evidence: Evidence, change: FloatArray, values: FloatArray) ->
         for support, factor in zip(evidence.supports, evidence.total.factors, strict=True)
     ]
     return float(np.sqrt(np.mean(np.array(squares) / evidence.n_t / residual**2)))
+
+
+def _consistent(problem: Problem, evidence: Evidence, weights: FloatArray) -> FloatArray:
+    """Return the values of bodies of positive density that fit the evidence best, (n_b,)."""
+    return consistent(evidence, problem.model, problem.base, weights=weights).values
 
 
 def _nominal(problem: Problem) -> FloatArray:

@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tauhat.errors import ExcitationError, TauhatWarning
+from tauhat.errors import ExcitationError, MapError, RecordingError, TauhatWarning
 from tauhat.excitation.sampled import SampledMotion, sampled_motion
+from tauhat.files import existing_file
+from tauhat.recordings.logmap import LogMap
 from tauhat.recordings.reading import read_recording
+from tauhat.recordings.recognising import recognise
+from tauhat.recordings.tables import open_table
 from tauhat.robots.fitting import check_joint_order
 from tauhat.robots.robot import Robot
 
@@ -37,7 +41,7 @@ def motion_for(robot: Robot, path: Path) -> SampledMotion:
             "a robot program cannot be read back", where=path,
             remedy="run the same tauhat excite with -o MOTION.parquet: the same seed gives the same motion",
         )  # fmt: skip
-    recording = read_recording(path)
+    recording = read_recording(path, map=_own_names(path))
     check_joint_order(robot, recording.joint_names, where=recording.name)
     if robot.n_v != recording.n_v:
         raise ExcitationError(
@@ -47,6 +51,15 @@ def motion_for(robot: Robot, path: Path) -> SampledMotion:
     motion = sampled_motion(recording)
     _warn_beyond_limits(robot, motion, path.name)
     return motion
+
+
+def _own_names(path: Path) -> LogMap | None:
+    """Return the map that the motion's own column names make: a map beside it is that of the logs in its folder."""
+    try:
+        named = recognise(open_table(existing_file(path, error=RecordingError)))
+    except MapError:
+        return None
+    return named if named.acceleration is not None else None
 
 
 def _warn_beyond_limits(robot: Robot, motion: SampledMotion, name: str) -> None:

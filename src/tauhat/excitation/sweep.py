@@ -87,8 +87,9 @@ def sweep(limits: MotionLimits, *, duration: float, start: float = 0.1, end: flo
             got=f"{start:g} to {end:g} Hz in {duration:g} s, speed {speed:g}",
         )  # fmt: skip
     n_v = limits.lower.size
+    apart = np.asarray(1.0 + _APART * np.arange(n_v), dtype=np.float64)
     unit = Sweep(
-        centre=np.zeros(n_v), amplitude=np.ones(n_v), start=start * (1.0 + _APART * np.arange(n_v)),
+        centre=np.zeros(n_v), amplitude=np.ones(n_v), start=start * apart,
         growth=float(np.log(end / start)) / duration, duration=duration,
     )  # fmt: skip
     fastest = end * float(unit.start.max()) / start

@@ -65,7 +65,7 @@ def load_project(path: str | Path) -> Project:
     ProjectError
         missing file, not TOML, unknown keys, values that mean nothing.
     """
-    place = project_path(path)
+    place = project_path(path).absolute()  # what is inside the folder is then told from what is not
     text, where = read_text(place, error=ProjectError, largest=_LARGEST_FILE), str(place)
     try:
         data = tomllib.loads(text)

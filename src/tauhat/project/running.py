@@ -103,10 +103,7 @@ def run_project(
     TauhatWarning
         what a step warned of, also when it is kept.
     """
-    steps = _asked_for(project, until, forced)
-    with only_run(project.folder):
-        remove_unfinished(_all_files(project, steps))
-        return _through(project, steps, frozenset(forced), tell or _silent)
+    return run_steps(project.folder, _asked_for(project, until, forced), forced=forced, tell=tell)
 
 
 def plan_project(project: Project, *, until: str | None = None, forced: Collection[str] = ()) -> ProjectRun:
@@ -119,59 +116,66 @@ def plan_project(project: Project, *, until: str | None = None, forced: Collecti
     ProjectError
         an unknown step.
     """
+    return plan_steps(project.folder, _asked_for(project, until, forced), forced=forced)
+
+
+def run_steps(
+    folder: Path, steps: Sequence[Step], *, forced: Collection[str] = (), tell: Tell | None = None
+) -> ProjectRun:
+    """Make steps in a folder; see `run_project`."""
+    with only_run(folder):
+        remove_unfinished(_all_files(folder, steps))
+        reports: list[StepReport] = []
+        digests = FileDigests()
+        for number, step in enumerate(steps, start=1):
+            if step.missing():
+                return _stopped(folder, steps, reports)
+            numbered = partial(_numbered, tell or _silent, f"{number}/{len(steps)}")
+            report = _brought_up_to_date(step, folder, digests, forced=forced, tell=numbered)
+            for message in report.warnings:
+                warnings.warn(message, TauhatWarning, stacklevel=3)
+            reports.append(report)
+    return ProjectRun(folder=folder, steps=tuple(reports))
+
+
+def plan_steps(folder: Path, steps: Sequence[Step], *, forced: Collection[str] = ()) -> ProjectRun:
+    """Return what would become of steps in a folder; see `plan_project`."""
     reports: list[StepReport] = []
-    awaited: tuple[Path, ...] = ()
     pending: dict[str, str] = {}
     digests = FileDigests()
-    for step in _asked_for(project, until, forced):
-        awaited = awaited or step.missing()
-        upstream = sorted({pending[name] for name in step.reads if name in pending})
-        if awaited:
-            state: State = "waits" if step.missing() == awaited and not _waiting(reports) else "not reached"
-            reports.append(StepReport(name=step.name, state=state, outputs=step.outputs))
-            continue
-        known = load_manifest(project.folder, step.name)
-        inputs = step.inputs(project.folder, digests)
-        reasons = _reasons(step, project.folder, known, inputs, digests)
-        reasons = (*(f"{name} is made before it" for name in upstream), *reasons)
-        reasons = ("it is asked for", *reasons) if step.name in forced else reasons
-        if reasons:
+    for step in steps:
+        if step.missing():
+            return _stopped(folder, steps, reports)
+        report = _planned(step, folder, digests, pending=pending, forced=forced)
+        if report.reasons:
             pending |= dict.fromkeys(step.outputs, step.name)
-        said = known.warnings if known and not reasons else ()
-        reports.append(
-            StepReport(
-                name=step.name,
-                state="to make" if reasons else "kept",
-                outputs=step.outputs,
-                reasons=reasons,
-                warnings=said,
-            )
-        )
-    return ProjectRun(folder=project.folder, steps=tuple(reports), awaited=awaited)
-
-
-def _waiting(reports: Sequence[StepReport]) -> bool:
-    return any(report.state == "waits" for report in reports)
-
-
-def _through(project: Project, steps: Sequence[Step], forced: Collection[str], tell: Tell) -> ProjectRun:
-    reports: list[StepReport] = []
-    awaited: tuple[Path, ...] = ()
-    digests = FileDigests()
-    for number, step in enumerate(steps, start=1):
-        if awaited:
-            reports.append(StepReport(name=step.name, state="not reached", outputs=step.outputs))
-            continue
-        awaited = step.missing()
-        if awaited:
-            reports.append(StepReport(name=step.name, state="waits", outputs=step.outputs))
-            continue
-        numbered = partial(_numbered, tell, f"{number}/{len(steps)}")
-        report = _brought_up_to_date(step, project.folder, digests, forced=forced, tell=numbered)
-        for message in report.warnings:
-            warnings.warn(message, TauhatWarning, stacklevel=3)
         reports.append(report)
-    return ProjectRun(folder=project.folder, steps=tuple(reports), awaited=awaited)
+    return ProjectRun(folder=folder, steps=tuple(reports))
+
+
+def _stopped(folder: Path, steps: Sequence[Step], reports: Sequence[StepReport]) -> ProjectRun:
+    """Return a run that ends at the first step without a report, since that one waits for files."""
+    waits, *others = steps[len(reports) :]
+    ahead = [StepReport(name=step.name, state="not reached", outputs=step.outputs) for step in others]
+    waiting = StepReport(name=waits.name, state="waits", outputs=waits.outputs)
+    return ProjectRun(folder=folder, steps=(*reports, waiting, *ahead), awaited=waits.missing())
+
+
+def _planned(
+    step: Step, folder: Path, digests: FileDigests, *, pending: Mapping[str, str], forced: Collection[str]
+) -> StepReport:
+    known = load_manifest(folder, step.name)
+    settled = {name: value for name, value in step.inputs(folder, digests).items() if name not in pending}
+    before = {} if known is None else {name: value for name, value in known.inputs.items() if name not in pending}
+    upstream = sorted({pending[name] for name in step.reads if name in pending})
+    reasons = (
+        *(("it is asked for",) if step.name in forced else ()),
+        *(f"{name} is made before it" for name in upstream),
+        *_reasons(step, folder, known, changes(settled, before), digests),
+    )
+    if reasons or known is None:
+        return StepReport(name=step.name, state="to make", outputs=step.outputs, reasons=reasons)
+    return StepReport(name=step.name, state="kept", outputs=step.outputs, warnings=known.warnings)
 
 
 def _brought_up_to_date(
@@ -179,7 +183,7 @@ def _brought_up_to_date(
 ) -> StepReport:
     known = load_manifest(folder, step.name)
     inputs = step.inputs(folder, digests)
-    reasons = _reasons(step, folder, known, inputs, digests)
+    reasons = _reasons(step, folder, known, changes(inputs, known.inputs if known else {}), digests)
     if known is not None and not reasons and step.name not in forced:
         return StepReport(name=step.name, state="kept", outputs=step.outputs, warnings=known.warnings)
     reasons = ("it is asked for", *reasons) if step.name in forced else reasons
@@ -215,12 +219,12 @@ def _made(step: Step) -> tuple[str, ...]:
 
 
 def _reasons(
-    step: Step, folder: Path, known: Manifest | None, inputs: Mapping[str, Any], digests: FileDigests
+    step: Step, folder: Path, known: Manifest | None, changed: Sequence[str], digests: FileDigests
 ) -> tuple[str, ...]:
     """Return in words why a step is not up to date; nothing where it is."""
     if known is None:
         return ("it was not made yet",)
-    reasons = [*changes(inputs, known.inputs)]
+    reasons = [*changed]
     if set(known.outputs) != set(step.outputs):
         reasons.append("it has other outputs")
     for name in step.outputs:
@@ -240,13 +244,13 @@ def _asked_for(project: Project, until: str | None, forced: Collection[str]) -> 
     return steps if until is None else steps[: names.index(until) + 1]
 
 
-def _all_files(project: Project, steps: Sequence[Step]) -> list[Path]:
-    """Return every file that this project writes, or wrote under other settings."""
+def _all_files(folder: Path, steps: Sequence[Step]) -> list[Path]:
+    """Return every file that these steps write, or wrote under other settings."""
     names = {name for step in steps for name in step.outputs}
     for step in steps:
-        known = load_manifest(project.folder, step.name)
+        known = load_manifest(folder, step.name)
         names |= set() if known is None else set(known.outputs)
-    return [*(project.folder / name for name in names), *(manifest_path(project.folder, step.name) for step in steps)]
+    return [*(folder / name for name in names), *(manifest_path(folder, step.name) for step in steps)]
 
 
 def _make_folders(folder: Path, outputs: Collection[str]) -> None:

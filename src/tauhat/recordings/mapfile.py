@@ -13,6 +13,7 @@ from tauhat.errors import MapError
 from tauhat.files import existing_file, read_text
 from tauhat.recordings.logmap import KINDS, Column, Coupling, LogMap, RowWindow, SignalMap, TimeMap
 
+FOLDER_MAP = "map.toml"  # of all logs in its folder
 _LARGEST_MAP = 2**20  # [bytes]
 _MOST_COLUMNS = 1000
 _SIGNAL_KEYS = ("columns", "unit", "scale", "sign", "offset", "delay_samples", "file", "interleaved")
@@ -74,7 +75,7 @@ def find_map(log: str | Path) -> Path | None:
     path = Path(log)
     stem = path.name.removesuffix(".gz")
     stem = next((stem.removesuffix(ending) for ending in _FORMATS if stem.lower().endswith(ending)), stem)
-    for candidate in (path.with_name(f"{stem}.map.toml"), path.with_name("map.toml")):
+    for candidate in (path.with_name(f"{stem}.map.toml"), path.with_name(FOLDER_MAP)):
         if candidate.is_file():
             return existing_file(candidate, error=MapError)
     return None

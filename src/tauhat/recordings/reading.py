@@ -14,7 +14,7 @@ from tauhat.files import existing_file, sha256_of
 from tauhat.recordings.binding import BoundLog, bind
 from tauhat.recordings.log import Log
 from tauhat.recordings.logmap import LogMap, RowWindow
-from tauhat.recordings.mapfile import find_map, load_map
+from tauhat.recordings.mapfile import FOLDER_MAP, find_map, load_map
 from tauhat.recordings.recognising import recognise
 from tauhat.recordings.recording import FEWEST_SAMPLES, Recording, Source
 from tauhat.recordings.tables import open_table
@@ -137,6 +137,8 @@ def _joined(last: Recording | None, log: Log) -> Log:
 def _opened(path: str | Path, log_map: LogMap | str | Path | None, rows: Rows | None) -> tuple[BoundLog, RowWindow]:
     place = existing_file(path, error=RecordingError)
     chosen = log_map if log_map is not None else find_map(place)
+    if log_map is None and chosen == place.with_name(FOLDER_MAP) and open_table(place).joint_names():
+        chosen = None  # written by tauhat, not one of the logs that the folder's map is for
     if chosen is None:
         chosen = recognise(open_table(place))
     elif not isinstance(chosen, LogMap):

@@ -11,6 +11,7 @@ from tauhat.arrays import FloatArray
 from tauhat.estimation.estimate import Estimate
 from tauhat.recordings.findings import Finding
 from tauhat.verification.prediction import LogPrediction, Verification
+from tauhat.verification.residual_tests import LogResiduals
 
 _FAR_CLOCK = 1e5  # [s] times beyond a day are wall clocks and read badly
 
@@ -32,6 +33,11 @@ class Case:
     def logs(self) -> tuple[LogPrediction, ...]:
         """The predictions, none without verification."""
         return self.verification.logs if self.verification else ()
+
+    @property
+    def residuals(self) -> tuple[LogResiduals, ...]:
+        """What the residuals of recordings still hold, none where they were not searched."""
+        return self.verification.residuals if self.verification else ()
 
     def was_fitted(self, log: LogPrediction) -> bool:
         """Return whether a log of that name went into the fit."""

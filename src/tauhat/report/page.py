@@ -38,7 +38,8 @@ def write_report(
 
     Parameters
     ----------
-    verification : predictions to draw; without them the report shows the fit's figures alone
+    verification : predictions to draw, and effects that residuals hold where they were searched; without them the
+        report shows the fit's figures alone
     findings : what checks of the logs said, all together or by the name of the log; None when none was made
     motion : that the logs were made with; adds chapters on its limits and on what it identifies
     title : heading; the robot's name by default
@@ -55,10 +56,10 @@ def write_report(
     require_libraries()
     from tauhat.report.case import Case
     from tauhat.report.motion_case import motion_case
-    from tauhat.report.sections import MOTION_SECTIONS, SECTIONS
+    from tauhat.report.sections import MOTION_SECTIONS, SECTIONS, missing
 
     case = Case(estimate=estimate, verification=verification, findings=_by_log(findings))
-    sections = [section(case) for section in SECTIONS]
+    sections = [section(case) for section in SECTIONS if section is not missing or case.residuals]
     if motion is not None:
         moved = motion_case(estimate.robot, motion, counted=information(with_exact_sign(estimate.model)))
         sections += [section(moved) for section in MOTION_SECTIONS]

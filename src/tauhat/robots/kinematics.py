@@ -43,7 +43,7 @@ def forward_kinematics(robot: Robot, q: ArrayLike, *, frame: str) -> Pose:
     ArrayError
         `q` of the wrong shape or not finite.
     """
-    target = _named_frame(robot, frame)
+    target = named_frame(robot, frame)
     single = _depth(q, robot) == 1
     batch = frozen("q", [q] if single else q, (None, robot.n_v), where=robot.name)
     rotation = np.broadcast_to(target.rotation, (len(batch), 3, 3))
@@ -71,7 +71,14 @@ def _depth(q: ArrayLike, robot: Robot) -> int:
     return depth
 
 
-def _named_frame(robot: Robot, name: str) -> Frame:
+def named_frame(robot: Robot, name: str) -> Frame:
+    """Return one of `robot.frames`, or a joint's own frame, by its name.
+
+    Raises
+    ------
+    RobotError
+        no frame of that name.
+    """
     frames = {joint.name: _joint_frame(index, joint) for index, joint in enumerate(robot.joints)}
     frames |= {frame.name: frame for frame in robot.frames}
     if name not in frames:

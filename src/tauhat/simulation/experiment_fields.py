@@ -37,11 +37,13 @@ def joint_row(fields: TomlFields, key: str, robot: Robot, default: float | None 
     """
     value = fields.table.get(key)
     if isinstance(value, Mapping):
-        if default is None:
-            raise SimulationError(f"{key} needs a value for every joint", where=fields.where)
-        table, row = TomlFields(value, f"{fields.where}, {key}"), np.full(robot.n_v, default)
+        table = TomlFields(value, f"{fields.where}, {key}")
+        row = np.full(robot.n_v, np.nan if default is None else default)
         for name in value:
             row[joint_of(robot, name, table.where)] = table.number(name)
+        if np.isnan(row).any():
+            missing = robot.joint_names[int(np.argmax(np.isnan(row)))]
+            raise SimulationError(f"{key} needs a value for every joint", where=table.where, expected=missing)
         return row
     if isinstance(value, list):
         return np.array(fields.row(key, robot.n_v))

@@ -114,7 +114,7 @@ def is_experiment(path: str | Path) -> bool:
         data = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return False
-    return "robot" in data and "joints" not in data
+    return isinstance(data.get("robot"), str) and "joints" not in data
 
 
 def load_experiment(path: str | Path) -> PlannedExperiment:
@@ -141,13 +141,16 @@ def load_experiment(path: str | Path) -> PlannedExperiment:
 
 def _experiment(top: TomlFields, folder: Path) -> PlannedExperiment:
     top.refuse_unknown(_SECTIONS)
-    robot = _robot(top, folder)
+    name = top.text("robot")
+    described_by = name if name in builtin_names() else str(folder / name)
+    robot = _robot(top, described_by)
     truth, log = top.subtable("truth"), top.subtable("log")
     truth.refuse_unknown(("spread", "friction", "elasticity", "heat", "attached"))
     log.refuse_unknown(("file", "rate", "settle"))
     sensors = top.subtable("sensors")
     return PlannedExperiment(
         robot=robot,
+        described_by=described_by,
         spread=truth.number("spread", 0.1),
         friction=truth.text("friction", "plain"),
         elasticity=_elasticity(truth.subtable("elasticity"), robot) if "elasticity" in truth.table else None,
@@ -162,10 +165,10 @@ def _experiment(top: TomlFields, folder: Path) -> PlannedExperiment:
     )
 
 
-def _robot(top: TomlFields, folder: Path) -> Robot:
-    name, locked = top.text("robot"), top.subtable("locked")
+def _robot(top: TomlFields, described_by: str) -> Robot:
+    locked = top.subtable("locked")
     positions = {joint: locked.number(joint) for joint in locked.table}
-    return load_robot(name if name in builtin_names() else folder / name, locked=positions or None)
+    return load_robot(described_by, locked=positions or None)
 
 
 def _elasticity(fields: TomlFields, robot: Robot) -> ElasticJoints:

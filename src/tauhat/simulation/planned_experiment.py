@@ -100,6 +100,7 @@ class PlannedExperiment:
     """Everything that a simulated experiment needs.
 
     robot : its description, what identification will know
+    described_by : name or file that it was loaded from, where known
     spread : how far the truth is from it, relative
     friction : one of `KINDS`
     elasticity, heat, attached : of the true robot
@@ -112,6 +113,7 @@ class PlannedExperiment:
     """
 
     robot: Robot
+    described_by: str = ""
     spread: float = 0.1
     friction: str = "plain"
     elasticity: ElasticJoints | None = None

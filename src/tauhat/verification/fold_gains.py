@@ -5,8 +5,8 @@ The residual `r` of one joint on one recording is cut into stretches of time. On
 is solved for b, the candidate's free coefficients, and for u, the error of the model's own parameters in deviations of
 their covariance (`D D'` is that of the predicted torque); the one left out judges. `s^2` is the variance of the
 residual, k how many rows one independent one is worth, and w by how many standard errors parameters may be off: none,
-one, 10 or 100, whatever predicts best. So a column that the model has in other words gains nothing, and parameters that
-the fit has bent to make up for a missing effect are free to go back.
+one, and so on to 10 000, whatever predicts best. So a column that the model has in other words gains nothing, and
+parameters that the fit has bent to make up for a missing effect are free to go back.
 
 Source: ridge as prior knowledge, Hoerl, Kennard 1970; blocked cross-validation, Burman, Chow, Nolan 1994.
 """
@@ -19,7 +19,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray
 
-WIDTHS = (1e-3, 1.0, 10.0, 100.0)  # standard errors that parameters may be off
+WIDTHS = (1e-3, 1.0, 10.0, 1e2, 1e3, 1e4)  # standard errors that parameters may be off
 _SUREST = 1e-12  # standard error below which there is none
 _OPTIMISM = 2.5  # a residual looks shorter in memory after a fit than the noise behind it is
 _RIDGE = 1e-6  # of the columns' own squares: candidates that cannot be told from another

@@ -17,6 +17,7 @@ from tauhat.recordings.processing import STANDSTILL, Processing
 from tauhat.recordings.recording import Recording
 from tauhat.robots.joint import Joint
 from tauhat.verification.bands import PredictionBand, half_bands, prediction_band
+from tauhat.verification.residual_tests import LogResiduals
 from tauhat.verification.series import Kinematics, joined, predicted_rows, temperature_at
 
 PARTS = 10  # stretches of time, and bins of speed, that the error is told for
@@ -119,14 +120,19 @@ class LogPrediction:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Verification:
-    """Prediction errors of one estimate on recordings it was not fitted to."""
+    """Prediction errors of one estimate on recordings it was not fitted to.
+
+    residuals : which effects their residuals still hold, where they were searched (`residual_tests`)
+    """
 
     logs: tuple[LogPrediction, ...]
     processing: Processing
+    residuals: tuple[LogResiduals, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return `{"logs": [...], "processing": {...}}` as plain data."""
-        return {"logs": [log.to_dict() for log in self.logs], "processing": self.processing.to_dict()}
+        """Return `{"logs": [...], "processing": {...}}` as plain data, and `residuals` where they were searched."""
+        document = {"logs": [log.to_dict() for log in self.logs], "processing": self.processing.to_dict()}
+        return document | ({"residuals": [log.to_dict() for log in self.residuals]} if self.residuals else {})
 
 
 @single_threaded

@@ -16,10 +16,11 @@ from tauhat.verification.whiteness import correlated_rows
 
 SAME = 0.01  # [rad or m] poses closer than that are one
 _LEAST_HOLD = 0.3  # [s] after settling
-_SETTLING = 0.2  # [s] at the start of a hold, which are left out
+_SETTLING = 0.2  # [s] at both ends of a hold, which are left out: the joints still creep there
 _SPAN = 0.05  # [s] over which speed is measured
 _STILL = 0.003  # of the top speed
 _SLOW = 0.1  # of the top speed
+_STEADY = 0.05  # of the top acceleration: where a joint turns round, both ways have the same inertia torque
 _FEWEST_ROWS = 3
 
 
@@ -51,10 +52,10 @@ def holds(recording: Recording, tau: FloatArray) -> Iterator[Stand]:
     if recording.n_t <= 2 * span:
         return
     speed = np.abs(q[span:] - q[:-span]) / (t[span:] - t[:-span])[:, None]
-    top = speed.max(axis=0)
-    still = (speed <= _STILL * top).all(axis=1)
-    for begin, end in _runs(still):
-        first = int(np.searchsorted(t, t[begin] + _SETTLING))
+    never = np.ptp(q, axis=0) < SAME
+    still = (never | (speed <= _STILL * speed.max(axis=0))).all(axis=1)
+    for begin, last in _runs(still):
+        first, end = (int(np.searchsorted(t, moment)) for moment in (t[begin] + _SETTLING, t[last] - _SETTLING))
         if first >= end or t[end] - t[first] < _LEAST_HOLD:
             continue
         pose = q[first:end].mean(axis=0)
@@ -64,18 +65,24 @@ def holds(recording: Recording, tau: FloatArray) -> Iterator[Stand]:
 
 def passes(log: LogPrediction) -> Iterator[Stand]:
     """Yield the poses through which one joint passes slowly while the others stand, cell by cell of its range."""
-    top = np.abs(log.dq).max(axis=0)
-    still = np.abs(log.dq) <= _STILL * top
+    top, hardest = np.abs(log.dq).max(axis=0), np.abs(log.ddq).max(axis=0)
+    still = (np.ptp(log.q, axis=0) < SAME) | (np.abs(log.dq) <= _STILL * top)
     for joint in range(log.dq.shape[1]):
         others = np.delete(still, joint, axis=1).all(axis=1)
         slow = others & ~still[:, joint] & (np.abs(log.dq[:, joint]) <= _SLOW * top[joint])
-        cell = np.floor(log.q[:, joint] / SAME).astype(np.intp)
+        slow &= np.abs(log.ddq[:, joint]) <= _STEADY * hardest[joint]
         for sign in (1.0, -1.0):
             way = slow & (np.sign(log.dq[:, joint]) == sign)
-            for number in np.unique(cell[way]):
-                rows = np.flatnonzero(way & (cell == number))
-                if rows.size >= _FEWEST_ROWS:
-                    yield _passed(log, rows, joint)
+            yield from (_passed(log, rows, joint) for rows in _cells(log.q[:, joint], way))
+
+
+def _cells(q: FloatArray, way: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:
+    """Yield the rows of a way that are in the same cell of the joint's range, where they are enough."""
+    cell = np.floor(q / SAME).astype(np.intp)
+    for number in np.unique(cell[way]):
+        rows = np.flatnonzero(way & (cell == number))
+        if rows.size >= _FEWEST_ROWS:
+            yield rows
 
 
 def _passed(log: LogPrediction, rows: NDArray[np.intp], joint: int) -> Stand:

@@ -140,8 +140,8 @@ def _groups(stands: Sequence[Stand]) -> list[list[Stand]]:
     """Return the stands by pose: each joins the first group whose first pose is the same."""
     groups: list[list[Stand]] = []
     for stand in stands:
-        same = (group for group in groups if np.abs(group[0].q - stand.q).max() < SAME)
-        group = next(same, [])
+        near = (group for group in groups if np.abs(group[0].q - stand.q).max() < SAME)
+        group: list[Stand] = next(near, [])
         if not group:
             groups.append(group)
         group.append(stand)
@@ -154,7 +154,7 @@ def _pair(estimate: Estimate, sides: tuple[list[Stand], list[Stand]], joint: int
     speed = float(np.mean([stand.speed[joint] for stand in both]))
     up, down = (float(np.mean([stand.tau[joint] for stand in side])) for side in sides)
     spreads = [float(np.linalg.norm([stand.error[joint] for stand in side])) / len(side) for side in sides]
-    error = 0.5 * float(np.hypot(*spreads))
+    error = 0.5 * float(np.linalg.norm(spreads))
     gravity, friction = _model_rows(estimate, pose, joint, speed)
     return StaticPair(
         joint=joint, position=float(pose[joint]), speed=speed, held=held,
@@ -166,7 +166,7 @@ def _pair(estimate: Estimate, sides: tuple[list[Stand], list[Stand]], joint: int
 
 
 def _deviation(estimate: Estimate, row: FloatArray) -> float:
-    return float(np.sqrt(max(row @ estimate.covariance @ row, 0.0)))
+    return float(np.sqrt(max(float(row @ estimate.covariance @ row), 0.0)))
 
 
 def _model_rows(estimate: Estimate, pose: FloatArray, joint: int, speed: float) -> tuple[FloatArray, FloatArray]:

@@ -194,6 +194,7 @@ def _document(robot: Robot, designs: Sequence[Design], paths: Sequence[Path], *,
 def _view(document: dict[str, Any], options: Options, distances: frozenset[str]) -> Iterator[RenderableType]:
     from rich.text import Text
 
+    from tauhat.cli.motions import numbered
     from tauhat.cli.views.motion import limits_table, motions_table, quality
 
     yield Text(quality(document, after=None if options.after is None else options.after.name))
@@ -203,3 +204,6 @@ def _view(document: dict[str, Any], options: Options, distances: frozenset[str])
     yield "Every run starts and ends at rest in one pose, and may be repeated without a pause."
     for motion in document["motions"]:
         yield unbroken(f"Written: {motion['motion']}")
+    if options.report is not None:
+        for page in numbered(options.report, options.motions):
+            yield unbroken(f"Written: {page}")

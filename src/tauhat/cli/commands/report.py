@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from tauhat.estimation.estimate import Estimate
     from tauhat.recordings.findings import Finding
     from tauhat.verification.prediction import Verification
+    from tauhat.verification.residual_tests import LogResiduals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +35,9 @@ class Options:
     cutoff: CutoffOption = None
     rows: RowsOption = None
     motion: MotionOption = None
+    residuals: Annotated[
+        bool, typer.Option("--residuals", help="Search the residuals for effects that the model does not have.")
+    ] = False
     as_json: JsonOption = False
 
 
@@ -50,6 +54,8 @@ def run(options: Options) -> None:
     motion = None if options.motion is None else motion_for(estimate.robot, options.motion)
     with working("checking and predicting"):
         verification, findings = _verified(estimate, options) if options.logs else (None, None)
+        if verification is not None and options.residuals:
+            verification = replace(verification, residuals=_missing(estimate, options))
     with working("drawing"):
         write_report(options.output, estimate, verification=verification, findings=findings, motion=motion)
     document = {
@@ -76,6 +82,15 @@ def _verified(estimate: Estimate, options: Options) -> tuple[Verification, tuple
     processing = processing_of(estimate, cutoff=options.cutoff)
     verification = verify(estimate, [log.recording() for log in logs], processing=processing)
     return verification, tuple(findings)
+
+
+def _missing(estimate: Estimate, options: Options) -> tuple[LogResiduals, ...]:
+    """Return which effects the residuals of the logs still hold."""
+    from tauhat.cli.inputs import processing_of, read_recordings
+    from tauhat.verification.residual_tests import residual_tests
+
+    recordings = read_recordings(options.logs or (), map_file=options.map_file, rows=options.rows)
+    return residual_tests(estimate, recordings, processing=processing_of(estimate, cutoff=options.cutoff))
 
 
 def _named(finding: Finding, log: str) -> Finding:

@@ -144,7 +144,7 @@ def _run_experiment(options: Options) -> None:
         beside = write_log(experiment.robot, simulation, log, notes=notes)
     document = _document(simulation, log, beside, seeds=(experiment.seed, experiment.robot_seed))
     document["experiment"] = options.robot
-    show(document, lambda: _view(document, experiment.robot.name), as_json=options.as_json)
+    show(document, lambda: _view(document, experiment.described_by), as_json=options.as_json)
 
 
 def _log_of(options: Options, log: Path | None) -> Path:

@@ -96,18 +96,17 @@ def run(options: Options) -> None:
     with working("predicting"):
         recordings = recordings_of_estimate(estimate, options.logs, map_file=options.map_file, rows=options.rows)
         verification = verify(estimate, recordings, processing=processing)
-    document, views = verification.to_dict(), [lambda: verification_view(verification)]
-    for more in _further(estimate, recordings, processing, options):
-        document |= more.document
-        views.append(more.view)
-    show(document, lambda: (part for view in views for part in view()), as_json=options.as_json)
+    parts = [_Part(verification.to_dict(), verification_view(verification))]
+    parts += _further(estimate, recordings, processing, options)
+    document = {key: value for part in parts for key, value in part.document.items()}
+    show(document, lambda: (line for part in parts for line in part.lines), as_json=options.as_json)
 
 
 class _Part(NamedTuple):
     """One further check: what it adds to the document, and how it is shown."""
 
     document: dict[str, Any]
-    view: Any
+    lines: Iterator[RenderableType]
 
 
 def _further(
@@ -120,17 +119,17 @@ def _further(
 
         with working("searching the residuals"):
             found = residual_tests(estimate, recordings, processing=processing, gear_ratios=_ratios(options.gear or ()))
-        yield _Part({"residuals": [log.to_dict() for log in found]}, lambda: residuals_view(found))
+        yield _Part({"residuals": [log.to_dict() for log in found]}, residuals_view(found))
     if options.static:
         from tauhat.verification.static import static_check
 
         with working("looking for held poses"):
             check = static_check(estimate, recordings)
-        yield _Part({"static": check.to_dict()}, lambda: static_view(check))
+        yield _Part({"static": check.to_dict()}, static_view(check))
     if options.known_payload is not None:
         with working("weighing"):
             known = _payload_check(estimate, processing, options.known_payload, options)
-        yield _Part({"known_payload": known.to_dict()}, lambda: payload_check_view(known))
+        yield _Part({"known_payload": known.to_dict()}, payload_check_view(known))
 
 
 def _payload_check(estimate: Estimate, processing: Processing, known: Weighed, options: Options) -> PayloadCheck:

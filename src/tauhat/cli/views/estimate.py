@@ -93,8 +93,9 @@ def _trust(estimate: Estimate) -> str:
     from tauhat.report.grading import condition_grade
 
     n_b, fitted = estimate.base.n_b, estimate.n_fitted
-    known = sum(row.relative < _WELL_KNOWN for row in estimate.summary())
-    dropped = f"; the other {n_b - fitted} cannot be seen in the recordings and are zero" if fitted < n_b else ""
+    known = sum(row.standard_error > 0.0 and row.relative < _WELL_KNOWN for row in estimate.summary())
+    instead = "zero" if estimate.physical is None else "as small as possible bodies allow"
+    dropped = f"; the other {n_b - fitted} cannot be seen in the recordings and are {instead}" if fitted < n_b else ""
     grade = condition_grade(estimate.condition, full_rank=estimate.rank >= fitted)
     return (
         f"{estimate.rank} of {n_b} base parameters determined, {known} of them to better than "

@@ -18,7 +18,7 @@ def project_view(document: Mapping[str, Any]) -> Iterator[RenderableType]:
     """Yield the table of steps, and the errors on unseen logs."""
     from rich.markup import escape
 
-    made = table(document["project"], ("step", "", "why, or what it left"), ("s",))
+    made = table(document["project"], ("step", "state", "why, or what it left"), ("s",))
     for step in document["steps"]:
         style = _STYLES[step["state"]]
         seconds = f"{step['seconds']:.1f}" if step["state"] == "made" else ""

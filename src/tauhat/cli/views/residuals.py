@@ -10,6 +10,7 @@ from tauhat.cli.views.tables import STYLES, aligned, table
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from tauhat.verification.joint_search import Effect
     from tauhat.verification.known_payload import PayloadCheck
     from tauhat.verification.residual_tests import LogResiduals
     from tauhat.verification.static import StaticCheck
@@ -23,8 +24,13 @@ def residuals_view(logs: Sequence[LogResiduals]) -> Iterator[RenderableType]:
         yield _whiteness_table(log)
         if log.ranked:
             yield _effects_table(log)
+            yield Text("".join(f"{line}\n" for line in dict.fromkeys(_advice(effect) for _, effect in log.ranked)))
         else:
             yield Text(f"{log.log}: no effect of the catalogue is left in the residuals.\n")
+
+
+def _advice(effect: Effect) -> str:
+    return f"{effect.effect}: {effect.advice}."
 
 
 def _whiteness_table(log: LogResiduals) -> RenderableType:
@@ -46,13 +52,13 @@ def _effects_table(log: LogResiduals) -> RenderableType:
     from rich.markup import escape
 
     made = table(
-        f"{log.log}: what the residuals hold", ("joint", "effect", "term", "what to do"), ("of the residual", "±")
+        f"{log.log}: what the residuals hold", ("joint", "effect", "term"), ("of the residual", "±")
     )  # fmt: skip
     for name, effect in log.ranked:
         order = f", {effect.order:g} a revolution" if effect.order else ""
         others = f" (or {', '.join(effect.alternatives)})" if effect.alternatives else ""
         made.add_row(
-            escape(name), f"{effect.effect}{order}{others}", effect.term or "none", effect.advice,
+            escape(name), f"{effect.effect}{order}{others}", effect.term or "none",
             f"{100 * effect.share:.1f} %", f"{100 * effect.standard_error:.1f} %",
         )  # fmt: skip
     return made

@@ -13,6 +13,7 @@ STYLES = {
     "best": "green", "good": "green", "fair": "yellow", "poor": "red",
     "ok": "green", "note": "cyan", "warning": "yellow", "error": "bold red",
 }  # fmt: skip
+_HUGE = 1e7  # from here on a number says only that it is absurd
 _MOST_DECIMALS = 6
 _NOTHING = "–"
 
@@ -40,7 +41,11 @@ def aligned(values: Sequence[float], *, like: Sequence[float] | None = None, dig
     """
     sizes = [abs(value) for value in (values if like is None else like) if value and math.isfinite(value)]
     decimals = min(max(0, digits - 1 - math.floor(math.log10(min(sizes)))), _MOST_DECIMALS) if sizes else 0
-    return [f"{value:.{decimals}f}" if math.isfinite(value) else _NOTHING for value in values]
+    return [_written(value, decimals) if math.isfinite(value) else _NOTHING for value in values]
+
+
+def _written(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if abs(value) < _HUGE else f"{value:.0e}"
 
 
 def graded(relative: float) -> str:

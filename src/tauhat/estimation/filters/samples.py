@@ -98,5 +98,5 @@ def refuse_memory(problem: Problem, method: str) -> None:
         if term.stateful or term.iterated:
             raise ModelError(
                 f"{method} cannot use term {term.key}, whose columns depend on more than the present state",
-                remedy="identify with pointwise terms, e.g. --terms inertia,rotor,viscous,coulomb,offset",
+                remedy="identify with pointwise terms, e.g. --model inertia,rotor,viscous,coulomb,offset",
             )

@@ -32,7 +32,7 @@ def check_step(place: Workplace) -> Step:
     record = place.project.record
     return Step(
         name="check",
-        settings={},
+        settings=place.settings_of_logs("record", record),
         files=place.files_of_logs(record),
         awaited=place.awaited(record),
         reads=(ROBOT, *place.simulated_logs),
@@ -48,7 +48,7 @@ def identify_step(place: Workplace) -> Step:
     own = [file for name in named for file in with_named_files(place.project.place(name))]
     return Step(
         name="identify",
-        settings=labelled("identify", wanted),
+        settings=labelled("identify", wanted) | place.settings_of_logs("record", record),
         files=(*own, *place.files_of_logs(record)),
         awaited=place.awaited(record),
         reads=(ROBOT, *place.simulated_logs),

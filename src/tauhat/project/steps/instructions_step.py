@@ -39,8 +39,8 @@ def _motion_lines(place: Workplace) -> Iterator[str]:
     yield f"- Run it on the robot: {', '.join((*place.motions, *place.programs))}. A .parquet file holds the columns"
     yield "  t, q_1.., dq_1.., ddq_1..; a .script file is a program for a Universal Robots controller."
     if isinstance(motion, DesignedMotion):
-        yield f"- It lasts {motion.periods} x {motion.seconds:g} s, starts and ends at rest in one pose, and keeps the joint"
-        yield "  limits at all times. The way to its start pose is not checked for collisions: go there slowly."
+        yield f"- It lasts {motion.periods} x {motion.seconds:g} s, starts and ends at rest in one pose, and keeps the"
+        yield "  joint limits at all times. The way to its start pose is not checked for collisions: go there slowly."
 
 
 def _log_lines(place: Workplace) -> Iterator[str]:

@@ -18,7 +18,7 @@ from tauhat.export.urscript import ServoSettings, write_urscript
 from tauhat.project.settings import DesignedMotion, GivenMotion, labelled
 from tauhat.project.step import Step, with_named_files
 from tauhat.project.steps.workplace import DESIGN, ROBOT, Workplace
-from tauhat.recordings.reading import read_recording
+from tauhat.recordings.recording import Recording
 from tauhat.recordings.writing import write_recording
 from tauhat.robots.robot import Robot
 
@@ -52,8 +52,11 @@ def _given(place: Workplace, motion: GivenMotion) -> Step:
 
 def _copy(place: Workplace, files: tuple[Path, ...]) -> None:
     for file, name in zip(files, place.motions, strict=True):
-        motion_for(place.robot, file)
-        write_recording(read_recording(file), place.path(name))
+        given = motion_for(place.robot, file).samples
+        names = place.robot.joint_names
+        write_recording(
+            Recording(t=given.t, q=given.q, dq=given.dq, ddq=given.ddq, joint_names=names), place.path(name)
+        )
 
 
 def _design(place: Workplace, motion: DesignedMotion) -> None:

@@ -44,11 +44,11 @@ def _steps(place: Workplace) -> Iterator[Step]:
         yield unseen_step(place, project.record, project.verify)
     yield check_step(place)
     yield identify_step(place)
+    if project.export is not None:  # before what may wait for another log
+        yield export_step(place, project.export)
     if project.verify is not None:
         yield verify_step(place)
     yield report_step(place)
-    if project.export is not None:
-        yield export_step(place, project.export)
 
 
 def _check_files(project: Project, steps: Sequence[Step]) -> None:

@@ -21,7 +21,7 @@ def verify_step(place: Workplace) -> Step:
     given = place.project.verify
     return Step(
         name="verify",
-        settings={},
+        settings=place.settings_of_logs("verify", given),
         files=place.files_of_logs(given),
         awaited=place.awaited(given),
         reads=(ESTIMATE, *place.unseen_log),
@@ -35,7 +35,7 @@ def report_step(place: Workplace) -> Step:
     given = place.project.verify
     return Step(
         name="report",
-        settings=labelled("report", place.project.report),
+        settings=labelled("report", place.project.report) | place.settings_of_logs("verify", given),
         files=place.files_of_logs(given),
         awaited=place.awaited(given),
         reads=(ESTIMATE, *place.motions, *(() if given is None else place.unseen_log)),

@@ -11,10 +11,12 @@ from typing import Any
 from tauhat.errors import TauhatWarning
 from tauhat.estimation.estimate import Estimate, input_log, load_estimate
 from tauhat.files import write_text
-from tauhat.project.settings import DesignedMotion, GivenLogs, Project, SimulatedLogs
+from tauhat.project.settings import DesignedMotion, GivenLogs, Project, SimulatedLogs, labelled
 from tauhat.project.step import log_files
 from tauhat.recordings.log import Log
 from tauhat.recordings.reading import read_log
+from tauhat.recordings.recognising import recognise
+from tauhat.recordings.tables import open_table
 from tauhat.robots.fitting import check_joint_order
 from tauhat.robots.library import builtin_names, load_robot
 from tauhat.robots.robot import Robot
@@ -90,6 +92,10 @@ class Workplace:
         log_map = self.given_map(given)
         return (*self.given_logs(given), *(() if log_map is None else (log_map,)))
 
+    def settings_of_logs(self, section: str, given: object) -> dict[str, Any]:
+        """Return names and order of logs that people bring; simulated ones have their own step."""
+        return labelled(section, given) if isinstance(given, GivenLogs) else {}
+
     def files_of_logs(self, given: object) -> tuple[Path, ...]:
         """Return these logs with their maps and what the maps name, as far as they are there."""
         log_map = self.given_map(given)
@@ -124,8 +130,10 @@ class Workplace:
         return logs
 
     def _logs(self, simulated: tuple[str, ...], given: object) -> list[Log]:
-        places = [self.path(name) for name in simulated] or self.given_logs(given)
-        return [read_log(place, map=self.given_map(given)) for place in places]
+        if simulated:  # their columns say what they are: a map in their folder is that of other logs
+            places = [self.path(name) for name in simulated]
+            return [read_log(place, map=recognise(open_table(place))) for place in places]
+        return [read_log(place, map=self.given_map(given)) for place in self.given_logs(given)]
 
     def estimate(self) -> Estimate:
         """Return the estimate."""

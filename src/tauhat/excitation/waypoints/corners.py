@@ -1,0 +1,155 @@
+"""The corner by which a motion passes a target: how much of both ways its zone takes, and how long it lasts at least."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tauhat.arrays import FloatArray
+from tauhat.errors import ExcitationError
+from tauhat.excitation.point_to_point import Course
+from tauhat.excitation.waypoints.curves import (
+    Corner,
+    CornerShape,
+    JointCorner,
+    LineCorner,
+    LineWay,
+    Way,
+    line_corner_task,
+)
+from tauhat.excitation.waypoints.line_task import Line
+from tauhat.excitation.waypoints.moves import LARGEST_PART, Zone
+from tauhat.excitation.waypoints.settings import WaypointSettings
+from tauhat.robots.kinematics import forward_kinematics
+from tauhat.robots.robot import Robot
+
+_LEAST_PART = 1e-4  # of a way: what a zone takes of it at least while its size is searched for
+_PARTS = 96
+_SMALLER = 0.95  # how much a zone shrinks at a time while its corner leaves it
+_MOST_SHRINKS = 200
+_GRID = 65
+
+
+class Bend(NamedTuple):
+    """A corner and the shortest time that the limits of acceleration and jerk leave for it [s]."""
+
+    corner: Corner
+    least: float
+
+
+class Neighbours(NamedTuple):
+    """Two ways that follow one another, and the part of the acceleration limits that may be used between them."""
+
+    first: Way
+    second: Way
+    acceleration: float
+
+
+def bend(robot: Robot, pair: Neighbours, zone: Zone, settings: WaypointSettings, name: str) -> Bend:
+    """Return the corner between two ways inside a zone.
+
+    Raises
+    ------
+    ExcitationError
+        when the tool cannot pass it: names which.
+    """
+    first, second = pair.first, pair.second
+    if isinstance(first, LineWay) and isinstance(second, LineWay):
+        shape = _line_shape(first.line, second.line, zone, settings)
+        corner = _line_corner(first, second, shape, name)
+        return Bend(corner, _least_of_lines(first.line, second.line, shape, (settings, pair.acceleration)))
+    joint_corner = _joint_corner(robot, pair, zone, settings)
+    return Bend(joint_corner, _least_of_joints(robot, joint_corner, settings, pair.acceleration))
+
+
+def _line_shape(first: Line, second: Line, zone: Zone, settings: WaypointSettings) -> CornerShape:
+    """Return the parts of two lines that lie in a zone: equal lengths of both, so that speed does not jump."""
+    lengths = [line.length for line in (first, second)]
+    moving = [length for length in lengths if length > 0.0]
+    if not moving:
+        part = zone.part or LARGEST_PART
+        return CornerShape(ending=part, beginning=part, ramps=settings.ramps)
+    shorter = min(moving)
+    radius = zone.part * shorter if zone.part is not None else min(zone.radius or 0.0, LARGEST_PART * shorter)
+    parts = [radius / length if length > 0.0 else LARGEST_PART for length in lengths]
+    return CornerShape(ending=parts[0], beginning=parts[1], ramps=settings.ramps)
+
+
+def _line_corner(first: LineWay, second: LineWay, shape: CornerShape, name: str) -> LineCorner:
+    start = first.state(Course(np.array([1.0 - shape.ending]), np.zeros(1), np.zeros(1))).q[0]
+
+    def curve(course: Course):  # type: ignore[no-untyped-def]
+        return line_corner_task(first.line, second.line, shape=shape, course=course)
+
+    knots = first.solver.follow(curve, start, name)
+    return LineCorner(first=first.line, second=second.line, shape=shape, solver=first.solver, knots=knots)
+
+
+def _joint_corner(robot: Robot, pair: Neighbours, zone: Zone, settings: WaypointSettings) -> JointCorner:
+    """Return a corner of which the tool's way, as the joints take it, stays in the zone."""
+    first, second = pair.first, pair.second
+    if zone.part is not None:
+        shape = CornerShape(ending=zone.part, beginning=zone.part, ramps=settings.ramps)
+        return JointCorner(first=first, second=second, shape=shape)
+    radius, frame = zone.radius or 0.0, settings.tool_frame(robot)
+    target = forward_kinematics(robot, second.start, frame=frame).translation
+
+    def reach(states: FloatArray) -> FloatArray:
+        return np.linalg.norm(forward_kinematics(robot, states, frame=frame).translation - target, axis=1)
+
+    parts = LARGEST_PART * np.geomspace(_LEAST_PART, 1.0, _PARTS)
+    ending = _largest_inside(parts, reach(first.state(_still(1.0 - parts)).q), radius)
+    beginning = _largest_inside(parts, reach(second.state(_still(parts)).q), radius)
+    grid = _still(np.linspace(0.0, 1.0, _GRID))
+    for _ in range(_MOST_SHRINKS):
+        shape = CornerShape(ending=ending, beginning=beginning, ramps=settings.ramps)
+        corner = JointCorner(first=first, second=second, shape=shape)
+        if reach(corner.state(grid).q).max() <= radius:
+            return corner
+        ending, beginning = _SMALLER * ending, _SMALLER * beginning
+    raise ExcitationError("no corner fits into the zone", got=f"radius {radius:g}", remedy="a larger zone, or none")
+
+
+def _largest_inside(parts: FloatArray, distances: FloatArray, radius: float) -> float:
+    """Return the largest part before which the tool is never farther away than the radius."""
+    outside = distances > radius
+    first = int(outside.argmax()) if outside.any() else parts.size
+    return float(parts[max(first - 1, 0)])
+
+
+def _least_of_joints(robot: Robot, corner: JointCorner, settings: WaypointSettings, part: float) -> float:
+    """Return the time in which the joints change from one way to the other at full acceleration."""
+    limits, shape = settings.joint_limits(robot), corner.shape
+    before = corner.first.state(Course(np.ones(1), np.ones(1), np.zeros(1))).dq[0]
+    after = corner.second.state(Course(np.zeros(1), np.ones(1), np.zeros(1))).dq[0]
+    change = np.abs(shape.beginning * after - shape.ending * before)
+    ramps = settings.ramps
+    least = float(np.sqrt((ramps.corner_acceleration * change / (part * limits.acceleration)).max()))
+    if limits.jerk is None:
+        return least
+    return max(least, float(np.cbrt((ramps.corner_jerk * change / (part * limits.jerk)).max())))
+
+
+def _least_of_lines(
+    first: Line, second: Line, shape: CornerShape, overrides: tuple[WaypointSettings, float]
+) -> float:
+    """Return the time in which the tool changes from one line to the other at its full acceleration."""
+    settings, part = overrides
+    tool, ramps = settings.tool, settings.ramps
+    rotation = first.rotation @ first.turned(np.ones(1))[0]
+    step = shape.beginning * second.step - shape.ending * first.step
+    turn = shape.beginning * (rotation @ second.turn) - shape.ending * (first.rotation @ first.turn)
+    least = 0.0
+    for change, acceleration, jerk in (
+        (float(np.linalg.norm(step)), tool.acceleration, tool.jerk),
+        (float(np.linalg.norm(turn)), tool.turn_acceleration, tool.turn_jerk),
+    ):
+        by_acceleration = np.sqrt(ramps.corner_acceleration * change / (part * acceleration))
+        by_jerk = np.cbrt(ramps.corner_jerk * change / (part * jerk))
+        least = max(least, float(by_acceleration), float(by_jerk))
+    return least
+
+
+def _still(parts: FloatArray) -> Course:
+    return Course(parts, np.zeros_like(parts), np.zeros_like(parts))
