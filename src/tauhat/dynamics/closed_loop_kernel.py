@@ -38,7 +38,7 @@ RUNAWAY = 1e3  # [rad/s or m/s] no robot moves this fast
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def leapfrog_kernel(arm, task, start, out):  # type: ignore[no-untyped-def]
     """Simulate by leapfrog steps; see the head of this file."""
-    elements, (law, _, times) = arm[3], task
+    elements, times = arm[3], task[2]
     _, n_v, n_t = out.shape
     rows, bent = np.zeros((16, n_v)), np.zeros(elements.size)
     rows[0], rows[1] = start[0], start[1]

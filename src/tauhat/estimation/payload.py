@@ -249,11 +249,11 @@ def _warn_of_misfit(payload: Payload, arm: Estimate) -> None:
     left = payload.free_joint_rms / np.maximum(payload.torque_rms, np.finfo(float).tiny)
     joints = np.flatnonzero((left > _MISFIT) & (payload.free_joint_rms > _WORSE * arm.joint_rms))
     if joints.size:
-        shares = ", ".join(f"{arm.robot.joint_names[joint]} {100 * left[joint]:.0f} %" for joint in joints)
+        shares = ", ".join(f"{100 * left[joint]:.0f} % on {arm.robot.joint_names[joint]}" for joint in joints)
         warnings.warn(
-            f"no payload explains the torque of the loaded run: {shares} of it are left, far more than in the fit of "
-            "the arm; its friction there does not hold with a load: give unloaded recordings as well (--unloaded), or "
-            "an estimate of a longer recording",
+            f"no payload explains the torque of the loaded run: {shares} are left, far more than in the fit of the "
+            "arm, mostly because its friction there does not hold with a load: give unloaded recordings as well "
+            "(--unloaded), or an estimate from a richer motion",
             TauhatWarning,
             stacklevel=3,
         )

@@ -39,12 +39,25 @@ from tauhat.excitation.static_motion import static_motion
 from tauhat.excitation.sweep import Sweep, sweep
 from tauhat.excitation.task_path import TaskPath, task_path
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
+from tauhat.excitation.waypoints import (
+    AccelerationLimited,
+    JerkLimited,
+    JointMove,
+    LineMove,
+    Slowed,
+    ToolLimits,
+    WaypointMotion,
+    WaypointSettings,
+    Zone,
+    waypoint_motion,
+)
 
 __all__ = [
     "CRITERIA",
     "FAR",
     "METHODS",
     "AOptimal",
+    "AccelerationLimited",
     "ConditionNumber",
     "Criterion",
     "DOptimal",
@@ -55,8 +68,11 @@ __all__ = [
     "FourierSpace",
     "GeneticSettings",
     "Information",
+    "JerkLimited",
+    "JointMove",
     "Knowledge",
     "LimitSet",
+    "LineMove",
     "Method",
     "Mixed",
     "MotionLimit",
@@ -67,10 +83,15 @@ __all__ = [
     "Repeated",
     "SampledMotion",
     "SampledSpace",
+    "Slowed",
     "Sweep",
     "TaskPath",
+    "ToolLimits",
     "Trajectory",
     "Trapezoidal",
+    "WaypointMotion",
+    "WaypointSettings",
+    "Zone",
     "after_evidence",
     "after_motions",
     "criterion_named",
@@ -91,5 +112,6 @@ __all__ = [
     "static_motion",
     "sweep",
     "task_path",
+    "waypoint_motion",
     "with_exact_sign",
 ]

@@ -4,6 +4,7 @@ from tauhat.robots.dh import robot_from_dh
 from tauhat.robots.fitting import check_joint_order, fit_to_joints
 from tauhat.robots.inertia_change import inertia_change
 from tauhat.robots.inertia_checks import inertia_defect
+from tauhat.robots.inverse_kinematics import inverse_kinematics, singularity_distance
 from tauhat.robots.joint import Joint, JointKind, Limits, central_inertia, inertia_at_origin
 from tauhat.robots.kinematics import Pose, forward_kinematics, pinocchio_model
 from tauhat.robots.library import builtin_names, describe_builtins, load_robot
@@ -33,11 +34,13 @@ __all__ = [
     "inertia_at_origin",
     "inertia_change",
     "inertia_defect",
+    "inverse_kinematics",
     "load_robot",
     "lock_joints",
     "modified_dh",
     "pinocchio_model",
     "robot_from_dh",
     "robot_from_urdf",
+    "singularity_distance",
     "with_modified_frames",
 ]

@@ -135,7 +135,7 @@ def inverse_kinematics(
     placement = kinematics.at(found)
     error = placement.distance_to(rotation, translation)
     if np.abs(error).max() > 10.0 * _REACHED:
-        left = f"{1e3 * np.linalg.norm(error[:3]):.3g} mm and {np.linalg.norm(error[3:]):.3g} rad away at the nearest"
+        left = f"{1e3 * np.linalg.norm(error[:3]):.4g} mm and {np.linalg.norm(error[3:]):.3g} rad away at the nearest"
         raise RobotError("the pose is not reached", where=where, got=left, remedy="a nearer pose, or another seed")
     least = smallest_singular_value(placement.jacobian)
     if least < singular:
@@ -146,9 +146,7 @@ def inverse_kinematics(
     return read_only(_inside(robot, found, where))
 
 
-def _search(
-    kinematics: FrameKinematics, q: FloatArray, rotation: FloatArray, translation: FloatArray
-) -> FloatArray:
+def _search(kinematics: FrameKinematics, q: FloatArray, rotation: FloatArray, translation: FloatArray) -> FloatArray:
     damping = _FIRST_DAMPING
     placement = kinematics.at(q)
     error = placement.distance_to(rotation, translation)

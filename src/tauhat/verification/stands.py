@@ -21,6 +21,7 @@ _SPAN = 0.05  # [s] over which speed is measured
 _STILL = 0.003  # of the top speed
 _SLOW = 0.1  # of the top speed
 _STEADY = 0.05  # of the top acceleration: where a joint turns round, both ways have the same inertia torque
+_CLEAR = 0.05  # [rad or m] from where a joint turns round: friction has built up, and no filter reaches across
 _FEWEST_ROWS = 3
 
 
@@ -71,9 +72,18 @@ def passes(log: LogPrediction) -> Iterator[Stand]:
         others = np.delete(still, joint, axis=1).all(axis=1)
         slow = others & ~still[:, joint] & (np.abs(log.dq[:, joint]) <= _SLOW * top[joint])
         slow &= np.abs(log.ddq[:, joint]) <= _STEADY * hardest[joint]
+        slow &= _clear_of_turns(log.q[:, joint], log.dq[:, joint])
         for sign in (1.0, -1.0):
             way = slow & (np.sign(log.dq[:, joint]) == sign)
             yield from (_passed(log, rows, joint) for rows in _cells(log.q[:, joint], way))
+
+
+def _clear_of_turns(q: FloatArray, dq: FloatArray) -> NDArray[np.bool_]:
+    """Return which rows are far from where the joint turns round, before and after, (n,)."""
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(np.sign(dq)) != 0) + 1, [q.size]])
+    way = np.repeat(np.arange(starts.size - 1), np.diff(starts))
+    begin, end = q[starts[:-1]][way], q[starts[1:] - 1][way]
+    return np.asarray((np.abs(q - begin) > _CLEAR) & (np.abs(q - end) > _CLEAR))
 
 
 def _cells(q: FloatArray, way: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:

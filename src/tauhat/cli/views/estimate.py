@@ -94,8 +94,8 @@ def _trust(estimate: Estimate) -> str:
 
     n_b, fitted = estimate.base.n_b, estimate.n_fitted
     known = sum(row.standard_error > 0.0 and row.relative < _WELL_KNOWN for row in estimate.summary())
-    instead = "zero" if estimate.physical is None else "as small as possible bodies allow"
-    dropped = f"; the other {n_b - fitted} cannot be seen in the recordings and are {instead}" if fitted < n_b else ""
+    instead = "are zero" if estimate.physical is None else "follow from the constraints"
+    dropped = f"; the other {n_b - fitted} cannot be seen in the recordings and {instead}" if fitted < n_b else ""
     grade = condition_grade(estimate.condition, full_rank=estimate.rank >= fitted)
     return (
         f"{estimate.rank} of {n_b} base parameters determined, {known} of them to better than "

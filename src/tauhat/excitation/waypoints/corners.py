@@ -1,4 +1,4 @@
-"""The corner by which a motion passes a target: how much of both ways its zone takes, and how long it lasts at least."""
+"""The corner by which a motion passes a target: what its zone takes of both ways, and how long it lasts at least."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tauhat.excitation.waypoints.curves import (
     line_corner_task,
 )
 from tauhat.excitation.waypoints.line_task import Line
-from tauhat.excitation.waypoints.moves import LARGEST_PART, Zone
+from tauhat.excitation.waypoints.moves import LARGEST_PART, SAME, Zone
 from tauhat.excitation.waypoints.settings import WaypointSettings
 from tauhat.robots.kinematics import forward_kinematics
 from tauhat.robots.robot import Robot
@@ -66,13 +66,13 @@ def bend(robot: Robot, pair: Neighbours, zone: Zone, settings: WaypointSettings,
 def _line_shape(first: Line, second: Line, zone: Zone, settings: WaypointSettings) -> CornerShape:
     """Return the parts of two lines that lie in a zone: equal lengths of both, so that speed does not jump."""
     lengths = [line.length for line in (first, second)]
-    moving = [length for length in lengths if length > 0.0]
+    moving = [length for length in lengths if length > SAME]
     if not moving:
         part = zone.part or LARGEST_PART
         return CornerShape(ending=part, beginning=part, ramps=settings.ramps)
     shorter = min(moving)
     radius = zone.part * shorter if zone.part is not None else min(zone.radius or 0.0, LARGEST_PART * shorter)
-    parts = [radius / length if length > 0.0 else LARGEST_PART for length in lengths]
+    parts = [radius / length if length > SAME else LARGEST_PART for length in lengths]
     return CornerShape(ending=parts[0], beginning=parts[1], ramps=settings.ramps)
 
 
@@ -96,7 +96,8 @@ def _joint_corner(robot: Robot, pair: Neighbours, zone: Zone, settings: Waypoint
     target = forward_kinematics(robot, second.start, frame=frame).translation
 
     def reach(states: FloatArray) -> FloatArray:
-        return np.linalg.norm(forward_kinematics(robot, states, frame=frame).translation - target, axis=1)
+        places = forward_kinematics(robot, states, frame=frame).translation
+        return np.asarray(np.linalg.norm(places - target, axis=1))
 
     parts = LARGEST_PART * np.geomspace(_LEAST_PART, 1.0, _PARTS)
     ending = _largest_inside(parts, reach(first.state(_still(1.0 - parts)).q), radius)
@@ -131,9 +132,7 @@ def _least_of_joints(robot: Robot, corner: JointCorner, settings: WaypointSettin
     return max(least, float(np.cbrt((ramps.corner_jerk * change / (part * limits.jerk)).max())))
 
 
-def _least_of_lines(
-    first: Line, second: Line, shape: CornerShape, overrides: tuple[WaypointSettings, float]
-) -> float:
+def _least_of_lines(first: Line, second: Line, shape: CornerShape, overrides: tuple[WaypointSettings, float]) -> float:
     """Return the time in which the tool changes from one line to the other at its full acceleration."""
     settings, part = overrides
     tool, ramps = settings.tool, settings.ramps

@@ -85,12 +85,12 @@ class LineWay:
     @property
     def start(self) -> FloatArray:
         """Where the joints are at the start, (n_v,) [rad or m]."""
-        return self.knots.q[0]
+        return np.asarray(self.knots.q[0])
 
     @property
     def end(self) -> FloatArray:
         """Where the joints are at the end, (n_v,) [rad or m]."""
-        return self.knots.q[-1]
+        return np.asarray(self.knots.q[-1])
 
     def state(self, course: Course) -> JointState:
         """Return the motion of the joints along the line."""

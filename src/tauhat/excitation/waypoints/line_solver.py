@@ -13,7 +13,7 @@ from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import ExcitationError
 from tauhat.excitation.point_to_point import Course
 from tauhat.excitation.waypoints.line_task import TaskMotion
-from tauhat.robots.inverse_kinematics import LEAST_SINGULAR_VALUE, FrameKinematics, Placement, smallest_singular_value
+from tauhat.robots.inverse_kinematics import FrameKinematics, Placement, smallest_singular_value
 from tauhat.robots.robot import Robot
 
 TaskCurve: TypeAlias = Callable[[Course], TaskMotion]
@@ -67,18 +67,19 @@ class LineSolver:
     """Solves tasks of one frame for one robot's joints; it owns work space, and travels as its settings alone.
 
     spare : the joints that the tool leaves free on an arm with more than six
+    singular : smallest singular value of the Jacobian on the way
     """
 
-    __slots__ = ("_kinematics", "_rows", "frame", "robot", "spare")
+    __slots__ = ("_kinematics", "_rows", "frame", "robot", "singular", "spare")
 
-    def __init__(self, robot: Robot, frame: str, spare: tuple[int, ...]) -> None:
-        self.robot, self.frame, self.spare = robot, frame, spare
+    def __init__(self, robot: Robot, frame: str, spare: tuple[int, ...], singular: float) -> None:
+        self.robot, self.frame, self.spare, self.singular = robot, frame, spare, singular
         self._kinematics = FrameKinematics(robot, frame)
         self._rows = np.eye(robot.n_v)[list(spare)]
 
-    def __reduce__(self) -> tuple[type[LineSolver], tuple[Robot, str, tuple[int, ...]]]:
+    def __reduce__(self) -> tuple[type[LineSolver], tuple[Robot, str, tuple[int, ...], float]]:
         """Return how to make it again."""
-        return type(self), (self.robot, self.frame, self.spare)
+        return type(self), (self.robot, self.frame, self.spare, self.singular)
 
     def states(self, task: TaskMotion, near: FloatArray) -> JointState:
         """Return the joint motion of a task, from positions near it.
@@ -114,7 +115,7 @@ class LineSolver:
                 raise self._lost(name, parts[-1])
             sign = self._checked(found[1], name, parts[-1])
             if sign * orientation < 0.0:
-                raise _singular(name, parts[-1], 0.0)
+                raise self._refused(name, parts[-1], 0.0)
             orientation = sign
             slopes.append(np.linalg.solve(found[1], task.velocity[0]))
             positions[-1] = found[0]
@@ -157,20 +158,27 @@ class LineSolver:
                 return None
             if np.abs(step).max() > 1.0:
                 return None
-            q = q + step  # noqa: PLR6104 - the seed is not ours to change
+            q = q + step
         return (q, jacobian) if size < _ROUNDED else None
 
     def _checked(self, jacobian: FloatArray, name: str, part: float) -> float:
         """Return the sign of a Jacobian's determinant, or refuse it."""
         least = smallest_singular_value(jacobian)
-        if least < LEAST_SINGULAR_VALUE:
-            raise _singular(name, part, least)
+        if least < self.singular:
+            raise self._refused(name, part, least)
         return float(np.linalg.slogdet(jacobian)[0])
+
+    def _refused(self, name: str, part: float, least: float) -> ExcitationError:
+        return ExcitationError(
+            f"{name} passes a singularity of the arm at {part:.0%} of the way", where=self.robot.name,
+            expected=f"smallest singular value >= {self.singular:g}", got=f"{least:.2g}",
+            remedy="another line, or a joint move",
+        )  # fmt: skip
 
     def _lost(self, name: str, part: float) -> ExcitationError:
         return ExcitationError(
-            f"{name} leaves the reach of the arm", where=self.robot.name, got=f"no solution beyond {part:.0%} of the way",
-            remedy="a nearer target, or a joint move",
+            f"{name} leaves the reach of the arm", where=self.robot.name,
+            got=f"no solution beyond {part:.0%} of the way", remedy="a nearer target, or a joint move",
         )  # fmt: skip
 
 
@@ -198,11 +206,3 @@ def spare_joints(robot: Robot, q: FloatArray, frame: str) -> tuple[int, ...]:
 def _at(part: float) -> Course:
     """Return the course of a curve passed at unit speed, at one part."""
     return Course(np.array([part]), np.ones(1), np.zeros(1))
-
-
-def _singular(name: str, part: float, least: float) -> ExcitationError:
-    return ExcitationError(
-        f"{name} passes a singularity of the arm at {part:.0%} of the way",
-        expected=f"smallest singular value >= {LEAST_SINGULAR_VALUE:g}", got=f"{least:.2g}",
-        remedy="another line, or a joint move",
-    )  # fmt: skip

@@ -82,8 +82,8 @@ class Line:
 def corner_task(first: Line, second: Line, *, ending: Course, beginning: Course) -> TaskMotion:
     """Return the motion of the tool while it still ends one line and already begins the next.
 
-    Ways add up, and turns follow one another: `p = corner + (x - 1) d1 + y d2`, `R = R1 exp(x f1) exp(y f2)`, with x and
-    y the parts of both lines.
+    Ways add up, and turns follow one another: `p = corner + (x - 1) d1 + y d2`, `R = R1 exp(x f1) exp(y f2)`, with x
+    and y the parts of both lines.
     """
     before, after = first.task(ending), second.task(beginning)
     turned = before.rotation @ second.turned(beginning.s)

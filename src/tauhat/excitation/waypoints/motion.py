@@ -11,8 +11,8 @@ import numpy as np
 from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import ExcitationError
 from tauhat.excitation.trajectory import MotionSamples
-from tauhat.excitation.waypoints.moves import JointMove, Move, move_from_dict, move_to_dict
-from tauhat.excitation.waypoints.route import SAME, route
+from tauhat.excitation.waypoints.moves import SAME, JointMove, Move, move_from_dict, move_to_dict
+from tauhat.excitation.waypoints.route import route
 from tauhat.excitation.waypoints.schedule import Piece
 from tauhat.excitation.waypoints.settings import WaypointSettings
 from tauhat.excitation.waypoints.slowing import Slowed, slow_down
@@ -171,6 +171,6 @@ def waypoint_motion(
 def _with_return(start: FloatArray, moves: tuple[Move, ...], settings: WaypointSettings) -> tuple[Move, ...]:
     """Return the moves with the way back to the start, where it is wanted and they do not end there."""
     last = moves[-1]
-    at_start = isinstance(last, JointMove) and last.target.shape == start.shape
-    at_start = at_start and bool(np.abs(last.target - start).max() <= SAME)
+    there = last.target if isinstance(last, JointMove) and last.target.shape == start.shape else None
+    at_start = there is not None and bool(np.abs(there - start).max() <= SAME)
     return moves if settings.ending == "stay" or at_start else (*moves, JointMove(target=start))

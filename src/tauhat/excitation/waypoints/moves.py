@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -12,7 +12,8 @@ from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import ExcitationError
 from tauhat.robots.kinematics import Pose
 
-_ORTHOGONAL = 1e-6
+SAME = 1e-9  # [m, rad] within which two targets are one
+_ORTHOGONAL = 1e-6  # of a target's rotation matrix
 LARGEST_PART = 0.5  # of a way that a zone takes: two zones may meet, never overlap
 
 
@@ -146,9 +147,8 @@ def move_from_dict(data: Mapping[str, Any]) -> Move:
     fields = dict(data)
     try:
         kind, target, zone = fields.pop("kind"), fields.pop("target"), fields.pop("zone")
-        kinds = {"joint": JointMove, "line": LineMove}
+        kinds: dict[str, Callable[..., Move]] = {"joint": JointMove, "line": LineMove}
         held = Pose(**target) if isinstance(target, Mapping) else target
-        move: Move = kinds[kind](target=held, zone=None if zone is None else Zone(**zone), **fields)
+        return kinds[kind](target=held, zone=None if zone is None else Zone(**zone), **fields)
     except (KeyError, TypeError) as error:
         raise ExcitationError("data of a move is damaged", got=f"{type(error).__name__}: {error}") from error
-    return move

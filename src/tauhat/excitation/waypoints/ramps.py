@@ -74,7 +74,9 @@ class AccelerationLimited:
         top = max(min(limits.speed, fits), first, last)
         ramps = (2.0 * top**2 - first**2 - last**2) / (2.0 * a)
         cruise = max(distance - ramps, 0.0) / top
-        return law_of_phases(ends[0], first, [((top - first) / a, a, 0.0), (cruise, 0.0, 0.0), ((top - last) / a, -a, 0.0)])
+        return law_of_phases(
+            ends[0], first, [((top - first) / a, a, 0.0), (cruise, 0.0, 0.0), ((top - last) / a, -a, 0.0)]
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -14,13 +15,12 @@ from tauhat.excitation.waypoints.corners import Bend, Neighbours, bend
 from tauhat.excitation.waypoints.curves import JointWay, LineWay, Way
 from tauhat.excitation.waypoints.line_solver import LineSolver, spare_joints
 from tauhat.excitation.waypoints.line_task import Line, rotation_vector
-from tauhat.excitation.waypoints.moves import JointMove, LineMove, Move, ToolLimits
+from tauhat.excitation.waypoints.moves import SAME, JointMove, LineMove, Move, ToolLimits
 from tauhat.excitation.waypoints.settings import WaypointSettings
 from tauhat.excitation.waypoints.time_law import RateLimits
 from tauhat.robots.kinematics import Pose, forward_kinematics
 from tauhat.robots.robot import Robot
 
-SAME = 1e-9  # [m, rad] within which two targets are one
 _TAUGHT = 1e-6  # [rad or m] within which a line reaches the joint positions it was given
 
 
@@ -54,20 +54,22 @@ def route(robot: Robot, start: FloatArray, moves: Sequence[Move], settings: Wayp
     for number, move in enumerate(moves, 1):
         here = ways[-1].end if ways else start
         if isinstance(move, LineMove):
-            solver = solver or LineSolver(robot, frame, spare_joints(robot, here, frame))
+            solver = solver or LineSolver(robot, frame, spare_joints(robot, here, frame), settings.singular)
             ways.append(_line_way(solver, here, move, f"move {number}"))
         else:
             ways.append(_joint_way(here, move, limits, f"move {number}"))
     rates = [
         joint_rates(way.end - way.start, limits, move)
         if isinstance(way, JointWay)
-        else _line_rates(way.line, limits, settings.tool, move)
+        else _line_rates(way, limits, settings.tool, move)
         for way, move in zip(ways, moves, strict=True)
     ]
     bends: list[Bend | None] = []
-    for k, (move, after) in enumerate(zip(moves[:-1], moves[1:], strict=True)):
+    for k, (move, after) in enumerate(pairwise(moves)):
         pair = Neighbours(first=ways[k], second=ways[k + 1], acceleration=min(move.acceleration, after.acceleration))
-        bends.append(None if move.zone is None else bend(robot, pair, move.zone, settings, f"the corner at move {k + 1}"))
+        bends.append(
+            None if move.zone is None else bend(robot, pair, move.zone, settings, f"the corner at move {k + 1}")
+        )
     return Route(tuple(ways), tuple(rates), tuple(bends), tuple(move.dwell for move in moves))
 
 
@@ -87,15 +89,17 @@ def joint_rates(way: FloatArray, limits: MotionLimits, move: Move) -> RateLimits
     )
 
 
-def _line_rates(line: Line, limits: MotionLimits, tool: ToolLimits, move: Move) -> RateLimits:
-    """Return the limits of the fraction of a line on which tool and free joints keep theirs."""
-    found = [RateLimits(np.inf, np.inf, np.inf)]
-    if line.length > 0.0:
-        found.append(RateLimits(tool.speed, tool.acceleration, tool.jerk))
-        found[-1] = RateLimits(*(value / line.length for value in found[-1]))
-    if line.angle > 0.0:
-        turn = (tool.turn_speed, tool.turn_acceleration, tool.turn_jerk)
-        found.append(RateLimits(*(value / line.angle for value in turn)))
+def _line_rates(way: LineWay, limits: MotionLimits, tool: ToolLimits, move: Move) -> RateLimits:
+    """Return the limits of the fraction of a line on which the tool keeps its own.
+
+    A line on which only free joints move keeps theirs.
+    """
+    path = (tool.speed, tool.acceleration, tool.jerk)
+    turn = (tool.turn_speed, tool.turn_acceleration, tool.turn_jerk)
+    sizes = ((path, way.line.length), (turn, way.line.angle))
+    found = [[value / size for value in values] for values, size in sizes if size > SAME]
+    if not found:
+        return joint_rates(way.end - way.start, limits, move)
     speed, acceleration, jerk = (min(values) for values in zip(*found, strict=True))
     return RateLimits(move.speed * speed, move.acceleration * acceleration, move.acceleration * jerk)
 

@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeAlias, get_args
 
+import numpy as np
+
 from tauhat.errors import ExcitationError
 from tauhat.excitation.limits.cartesian_limit import tool_frame
 from tauhat.excitation.limits.joint_limits import MotionLimits, motion_limits
 from tauhat.excitation.waypoints.moves import ToolLimits
 from tauhat.excitation.waypoints.ramps import AccelerationLimited, JerkLimited, Ramps, ramps_named
+from tauhat.robots.inverse_kinematics import LEAST_SINGULAR_VALUE
 from tauhat.robots.robot import Robot
 
 Ending: TypeAlias = Literal["stay", "return"]
@@ -27,6 +30,7 @@ class WaypointSettings:
     tool : what line moves may ask of the tool
     ramps : how speeds change; `JerkLimited` needs limits of jerk
     frame : the tool's frame; the robot's last where not stated
+    singular : smallest singular value of the Jacobian, in metres and radians, that lines may pass
     ending : "return" adds a joint move back to the start, after which the motion repeats
     """
 
@@ -34,11 +38,14 @@ class WaypointSettings:
     tool: ToolLimits = field(default_factory=ToolLimits)
     ramps: Ramps = field(default_factory=AccelerationLimited)
     frame: str | None = None
+    singular: float = LEAST_SINGULAR_VALUE
     ending: Ending = "stay"
 
     def __post_init__(self) -> None:
         if self.ending not in get_args(Ending):
             raise ExcitationError("ending of a motion", expected=" or ".join(get_args(Ending)), got=self.ending)
+        if not 0.0 < self.singular < np.inf:
+            raise ExcitationError("smallest singular value of a line", expected="above zero", got=self.singular)
 
     def joint_limits(self, robot: Robot) -> MotionLimits:
         """Return the limits of the joints, after checking that they suit the robot and the ramps.
@@ -86,6 +93,7 @@ class WaypointSettings:
             "tool": asdict(self.tool),
             "ramps": self.ramps.key,
             "frame": self.frame,
+            "singular": self.singular,
             "ending": self.ending,
         }
 

@@ -16,7 +16,7 @@ from tauhat.excitation.waypoints.schedule import Piece, Place, Tempo, first_temp
 
 _PARTS = np.linspace(0.0, 1.0, 17)  # of a phase, at which limits are looked at
 _ROUNDING = 1e-9  # part of a limit
-_RESERVE = 2e-3  # part of a limit kept for what lies between the parts on curves that are no polynomials
+_RESERVE = 2e-4  # part of a limit kept for what lies between the parts on curves that are no polynomials
 _MOST_ROUNDS = 100
 _PUSH = 1.0 + 1e-4  # slowed a little more than asked, since speeds at the ends of a way follow in the next round
 _REPORTED = 1e-6
@@ -98,9 +98,7 @@ def _excess(piece: Piece, limits: MotionLimits, joint_names: tuple[str, ...]) ->
         _check_range(piece, state.q, limits, joint_names)
         step = float(t[1] - t[0])
         rows = [_peak(state.dq) / limits.velocity, _peak(state.ddq) / limits.acceleration]
-        rows.append(
-            np.zeros(len(joint_names)) if limits.jerk is None else _peak_slope(state.ddq, step) / limits.jerk
-        )
+        rows.append(np.zeros(len(joint_names)) if limits.jerk is None else _peak_slope(state.ddq, step) / limits.jerk)
         used = np.maximum(used, rows)
     stretches = np.maximum(used, 0.0) ** np.array([[1.0], [0.5], [1.0 / 3.0]])
     if used.max() <= 1.0 + reserve:
@@ -119,7 +117,8 @@ def _check_range(piece: Piece, q: FloatArray, limits: MotionLimits, joint_names:
         raise ExcitationError(
             f"the {piece.place} of move {piece.move + 1} leaves the range of {joint_names[joint]}",
             expected=f"{limits.lower[joint]:g} to {limits.upper[joint]:g}",
-            got=f"{lowest[joint]:.4g} to {highest[joint]:.4g}", remedy="another target, a smaller zone, or a joint move",
+            got=f"{lowest[joint]:.4g} to {highest[joint]:.4g}",
+            remedy="another target, a smaller zone, or a joint move",
         )  # fmt: skip
 
 
@@ -139,7 +138,7 @@ def _peak(values: FloatArray, signs: tuple[float, ...] = (1.0, -1.0)) -> FloatAr
 
 
 def _peak_slope(values: FloatArray, step: float) -> FloatArray:
-    """Return a bound of the largest slope of each column, (n_v,): that of its steps, and half their next change more."""
+    """Return a bound of the largest slope of each column, (n_v,): that of a step, and half the next change more."""
     slopes = np.diff(values, axis=0) / step
     change = np.abs(np.diff(slopes, axis=0))
     more = 0.5 * np.maximum(np.pad(change, ((1, 0), (0, 0))), np.pad(change, ((0, 1), (0, 0))))

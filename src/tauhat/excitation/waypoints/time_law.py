@@ -11,6 +11,8 @@ from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import ExcitationError
 from tauhat.excitation.point_to_point import Course
 
+_LEAST_TIME = 1e-12  # [s]
+
 
 class RateLimits(NamedTuple):
     """Largest derivatives of a fraction of a way: by time [1/s], [1/s^2] and [1/s^3]."""
@@ -49,9 +51,7 @@ class TimeLaw:
         phase = np.clip(np.searchsorted(self.begin, t, side="right") - 1, 0, self.begin.size - 1)
         s, ds, dds, jerk = self.state[phase].T
         u = t - self.begin[phase]
-        return Course(
-            s + u * (ds + u * (dds / 2.0 + u * jerk / 6.0)), ds + u * (dds + u * jerk / 2.0), dds + u * jerk
-        )
+        return Course(s + u * (ds + u * (dds / 2.0 + u * jerk / 6.0)), ds + u * (dds + u * jerk / 2.0), dds + u * jerk)
 
     def within(self, phase: int, parts: FloatArray) -> tuple[FloatArray, Course]:
         """Return times and course at parts from 0 to 1 of one phase, its two ends as limits from inside."""
@@ -65,11 +65,11 @@ class TimeLaw:
 def law_of_phases(start: float, rate: float, phases: list[tuple[float, float, float]]) -> TimeLaw:
     """Return the law that begins at a fraction and rate and runs through phases of time, acceleration and jerk.
 
-    Phases without time are left out.
+    Phases shorter than rounding are left out.
     """
     begin, states, now, s, ds = [], [], 0.0, start, rate
     for time, acceleration, jerk in phases:
-        if time <= 0.0:
+        if time <= _LEAST_TIME:
             continue
         begin.append(now)
         states.append((s, ds, acceleration, jerk))

@@ -40,8 +40,8 @@ def _ranked(budget: ErrorBudget) -> Chapter:
         "Squared error of the predicted torque, in parts of the torque's square: against the true torque along the "
         "true motion (of the model), and against a log as tauhat verify shows it (on the log), while the robot moves. "
         "A share is the mean of what goes when only this cause is switched off and what comes when it is the only one. "
-        "A cause that works by magnifying others, such as a short motion, shares with them. Below zero: it hides part of "
-        "another one."
+        "A cause that works by magnifying others, such as a short motion, shares with them. Below zero: it hides part "
+        "of another one."
     )
     rows = tuple(
         (

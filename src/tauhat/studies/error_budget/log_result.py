@@ -51,7 +51,17 @@ def _parts(budget: LogBudget) -> list[_Part]:
         noise, rest = "white noise of the torque", "has no name"
         quiet = "No model can predict it. This is the least that noise makes: a repeated motion and --period tell all."
         unknown = "Coloured noise, or model error of a kind that the catalogue of effects does not have."
-    parts += [_Part(noise, budget.noise, 0.0, "", quiet), _Part(rest, budget.unnamed, 0.0, "", unknown)]
+    unsure = "Noise and the motion of the fitted logs leave them so: identify from more logs, or a motion of excite."
+    others = (
+        "They are others on this log than in the fit, or were bent to make up for an effect: add terms that are named "
+        "here and identify again, from logs at the temperature and with the payload of the task."
+    )
+    parts += [
+        _Part(noise, budget.noise, 0.0, "", quiet),
+        _Part("uncertain parameters", budget.uncertain, 0.0, "", unsure),
+        _Part("parameters that are others here", budget.refitted, 0.0, "", others),
+        _Part(rest, budget.unnamed, 0.0, "", unknown),
+    ]
     return sorted(parts, key=lambda part: -part.share)
 
 
@@ -132,9 +142,11 @@ def _to_do(budget: LogBudget) -> Chapter:
 def _meaning() -> Chapter:
     shares = (
         "An effect's share is what it removes of the squared residual on stretches of the log on which it was not "
-        "fitted, beside the effects before it. Noise is the variance of the residual from period to period, less named "
-        "effects that change over time; without a period only the white part of the torque's noise is known, and what "
-        "drives filter before they log is not even in that."
+        "fitted, beside the model's own parameters, refitted, and the effects before it. Noise is the variance of the "
+        "residual from period to period, less named effects that change over time; without a period only the white part "
+        "of the torque's noise is known, and what drives filter before they log is not even in that. Uncertain "
+        "parameters: what refitting them removes, as far as their error bars let expect; beyond that, they are others "
+        "here."
     )
     unseen = "Factors of the torque that are wrong in all logs alike show in no residual: see calibrate-drives."
     return Chapter(title="What it means", text=(shares, unseen))
@@ -145,7 +157,7 @@ def _joints(share: LogShare) -> str:
 
 
 def _sentence_of(text: str) -> str:
-    sentence = text[:1].upper() + text[1:]
+    sentence = (text[:1].upper() + text[1:]).replace("`", "")
     return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
 
 

@@ -1,9 +1,11 @@
-"""The error budget of a real log: effects that its residual holds, what does not repeat, and what has no name.
+"""The error budget of a real log: effects that its residual holds, noise, uncertain parameters, what has no name.
 
 What is named are effects that the model lacks, each with the share of the squared residual that it removes where it was
 not fitted. Where the motion repeats with a known period, the variance of the residual from period to period is noise:
 no model of the motion can predict it. Where it does not, only the white part of the torque's noise is known, which is
-less than all of it.
+less than all of it. Beside them stands what parameters of the model's own remove when they are refitted on stretches
+of the log: as much as their covariance lets expect is uncertainty, the rest says that they are others here, or that the
+fit has bent them to make up for a missing effect. Effects are counted beside refitted parameters.
 """
 
 from __future__ import annotations
@@ -19,13 +21,16 @@ from tauhat.errors import ModelError
 from tauhat.estimation.estimate import Estimate
 from tauhat.recordings.processing import Processing, clock_step, white_noise
 from tauhat.recordings.recording import Recording
-from tauhat.verification.joint_search import Effect
+from tauhat.verification.joint_search import Effect, JointCase, no_columns
 from tauhat.verification.prediction import LogPrediction, predict_recording
 from tauhat.verification.residual_tests import LogResiduals, residual_tests
+from tauhat.verification.series import Kinematics, base_places, covariance_root, joined, predicted_rows
+from tauhat.verification.whiteness import whiteness
 
 NoiseSource: TypeAlias = Literal["periods", "white torque"]
 _NOT_REPEATING = frozenset({"time", "temperature"})  # dependences of effects that differ from period to period
 _FEWEST_PERIODS = 2
+_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +62,9 @@ class LogBudget:
         of the torque's white noise, at least
     source : how the noise is known
     periods : how many of the log were compared; zero without a period
-    unnamed : share that repeats and has no name, never below zero
+    uncertain : share that refitted parameters remove, as far as the error bars of the fit let it expect
+    refitted : share that they remove beyond that
+    unnamed : share that is left, never below zero
     joints : name and share of the squared residual
     """
 
@@ -68,6 +75,8 @@ class LogBudget:
     noise: float
     source: NoiseSource
     periods: int
+    uncertain: float
+    refitted: float
     unnamed: float
     joints: tuple[tuple[str, float], ...]
 
@@ -113,7 +122,7 @@ def _of_log(
 ) -> LogBudget:
     prediction = predict_recording(estimate, recording, processing=processing)
     squares = np.mean((prediction.tau - prediction.predicted) ** 2, axis=0)
-    weights = squares / max(float(squares.sum()), float(np.finfo(float).tiny))
+    weights = squares / max(float(squares.sum()), _TINY)
     missing = _gathered([joint.missing for joint in residuals.joints], residuals, weights)
     changed = _gathered([joint.changed for joint in residuals.joints], residuals, weights)
     if period is None:
@@ -123,7 +132,8 @@ def _of_log(
     noise = float(weights @ np.minimum(variance / np.where(squares > 0.0, squares, 1.0), 1.0))
     if periods:
         noise = max(noise - _varying(residuals, weights), 0.0)
-    named = sum(share.share for share in missing)
+    refit = float(weights @ refitted_shares(estimate, recording, processing))
+    uncertain = min(float(np.mean(prediction.std**2, axis=0).sum() / max(float(squares.sum()), _TINY)), refit)
     return LogBudget(
         log=residuals.log,
         relative_rms=prediction.relative_rms,
@@ -132,7 +142,9 @@ def _of_log(
         noise=noise,
         source="periods" if periods else "white torque",
         periods=periods,
-        unnamed=max(1.0 - named - noise, 0.0),
+        uncertain=uncertain,
+        refitted=refit - uncertain,
+        unnamed=max(1.0 - sum(share.share for share in missing) - noise - refit, 0.0),
         joints=tuple((joint.name, float(weight)) for joint, weight in zip(residuals.joints, weights, strict=True)),
     )
 
@@ -167,6 +179,37 @@ def _varying(residuals: LogResiduals, weights: FloatArray) -> float:
             if effect.dependence in _NOT_REPEATING
         )
     )
+
+
+def refitted_shares(estimate: Estimate, recording: Recording, processing: Processing) -> FloatArray:
+    """Return the share of each joint's squared residual that refitting its own parameters removes, (n_v,).
+
+    They are refitted on all stretches of the recording but one, which judges, as the residual tests do; never below
+    zero.
+    """
+    pieces = predicted_rows(estimate, recording, processing=processing, probes=Kinematics())
+    rows = joined(list(pieces), recording)
+    step = float(rows.t[-1] - rows.t[0]) / (rows.t.size - 1)
+    layout = estimate.model.layout(estimate.base.independent)
+    shares = []
+    for joint, residual in enumerate(rows.tau - rows.predicted):
+        place = base_places(estimate, np.asarray(layout.parameters[layout.of_joint(joint)]))
+        case = JointCase(
+            joint=joint,
+            name=estimate.robot.joint_names[joint],
+            unit="",
+            rms=float(np.sqrt(np.mean(residual**2))),
+            relative_rms=float("nan"),
+            residual=residual,
+            own=rows.own[joint],
+            terms=(),
+            root=covariance_root(estimate.covariance[np.ix_(place, place)]),
+            whiteness=whiteness(residual, step=step, cutoff=processing.cutoff),
+        )
+        folds = case.cut(np.zeros((0, residual.size)))
+        whole = float(folds.squares.sum())
+        shares.append(max(1.0 - float(folds.free(no_columns()).sum()) / max(whole, _TINY), 0.0))
+    return np.array(shares)
 
 
 def _unrepeated_variance(prediction: LogPrediction, period: float) -> tuple[FloatArray, int]:
