@@ -77,7 +77,7 @@ def program(seed: int) -> tuple[Robot, np.ndarray, list[JointMove | LineMove], W
         if choice < 0.35:
             zone = Zone(radius=float(10.0 ** rng.uniform(-2.5, -0.8)))
         elif choice < 0.65:
-            zone = Zone(part=float(rng.uniform(0.02, 0.5)))
+            zone = Zone(part=float(rng.uniform(0.02, 0.4)))
         elif choice < 0.75:
             dwell = float(rng.uniform(0.05, 0.5))
         common = {

@@ -121,7 +121,7 @@ def test_temperature_is_blamed_where_it_was_logged():
 
 
 def test_the_shares_are_those_of_the_squared_residual():
-    """The arm without noise and with a ripple has nothing else in its residual; noise of equal size halves its share."""
+    """A ripple of the size of the noise is half of the squared residual."""
     level = 0.3 * np.sqrt(0.1)  # what a low-pass of 10 of 100 Hz leaves of the second joint's noise
     joint = found(lambda log: np.sqrt(2.0) * level * np.sin(7.0 * log.q)).joints[1]
     assert joint.missing[0].share == pytest.approx(0.5, abs=0.12)

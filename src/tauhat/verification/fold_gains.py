@@ -5,8 +5,9 @@ The residual `r` of one joint on one recording is cut into stretches of time. On
 is solved for b, the candidate's free coefficients, and for u, the error of the model's own parameters in deviations of
 their covariance (`D D'` is that of the predicted torque); the one left out judges. `s^2` is the variance of the
 residual, k how many rows one independent one is worth, and w by how many standard errors parameters may be off: none,
-one, and so on to 10 000, whatever predicts best with b. So a column that the model has in other words gains nothing,
-and parameters that the fit has bent to make up for a missing effect are free to go back.
+one, and so on to 10 000, whatever predicts best, with b and without. So a column that the model has in other words
+gains nothing, parameters that the fit has bent to make up for a missing effect are free to go back, and what refitted
+parameters explain by themselves is not credited to an effect: its share is what only the effect can explain.
 
 Source: ridge as prior knowledge, Hoerl, Kennard 1970; blocked cross-validation, Burman, Chow, Nolan 1994.
 """
@@ -67,15 +68,6 @@ class Folds:
         """Return the best of `left` over the widths, as a whole."""
         return self.left(chosen, width=self._best_width(chosen))
 
-    def compared(self, fixed: IntArray, added: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return what is left without and with the added columns, at the width that serves best with them.
-
-        Both at one width: an effect that needs no change of the parameters has the credit for what it explains, also
-        where a change of parameters could mimic most of it; one that only helps where they stay has none.
-        """
-        width = self._best_width(np.concatenate([fixed, added]))
-        return self.left(fixed, width=width), self.left(np.concatenate([fixed, added]), width=width)
-
     def remaining(self, chosen: IntArray) -> FloatArray:
         """Return the residual that a fit of these columns on the whole recording leaves, (n,)."""
         places = self._places(chosen)
@@ -85,21 +77,15 @@ class Folds:
     def _best_width(self, chosen: IntArray) -> float:
         return min(WIDTHS, key=lambda width: float(self.left(chosen, width=width).sum()))
 
-    def compared_choice(
-        self, fixed: IntArray, choices: tuple[IntArray, ...]
-    ) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return `compared` when each fold takes the choice that fits best on the others, and the choice of all.
+    def free_choice(self, fixed: IntArray, choices: tuple[IntArray, ...]) -> tuple[FloatArray, IntArray]:
+        """Return what is left when each fold takes the choice that fits best on the others, and all folds together's.
 
         Parameters
         ----------
         fixed : columns that are in, whatever is chosen
         choices : columns of each choice
         """
-        tried = [(width, *self._chosen(fixed, choices, width)) for width in WIDTHS]
-        width, left, best = min(tried, key=lambda outcome: float(outcome[1].sum()))
-        return self.left(fixed, width=width), left, best
-
-    def _chosen(self, fixed: IntArray, choices: tuple[IntArray, ...], width: float) -> tuple[FloatArray, IntArray]:
+        width = self._best_width(fixed)
         inside = np.empty((len(choices), len(self.grams)))
         outside = np.empty_like(inside)
         for row, choice in enumerate(choices):

@@ -126,21 +126,22 @@ class Search:
         ----------
         without : effects that are left out
         """
+        before = self.folds.free(fixed)
         found = [
-            self._outcome(candidate, own, fixed)
+            self._outcome(candidate, own, fixed, before)
             for candidate, own in zip(self.candidates, self.places, strict=True)
             if candidate.effect not in without
         ]
         return tuple(sorted(found, key=lambda outcome: -outcome.effect.share))
 
-    def _outcome(self, candidate: Candidate, own: tuple[IntArray, ...], fixed: IntArray) -> Outcome:
+    def _outcome(self, candidate: Candidate, own: tuple[IntArray, ...], fixed: IntArray, before: FloatArray) -> Outcome:
         order = None
         if candidate.choices:
-            before, left, best = self.folds.compared_choice(fixed, own)
+            left, best = self.folds.free_choice(fixed, own)
             order = float(candidate.labels[[int(place[0]) for place in own].index(int(best[0]))])
         else:
             best = own[0]
-            before, left = self.folds.compared(fixed, best)
+            left = self.folds.free(np.concatenate([fixed, best]))
         rest = self.folds.remaining(np.concatenate([fixed, best]))
         return Outcome(candidate, best, left, judged(candidate, self.folds, (before, left), rest=rest, order=order))
 

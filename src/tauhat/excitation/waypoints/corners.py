@@ -20,7 +20,9 @@ from tauhat.excitation.waypoints.curves import (
 )
 from tauhat.excitation.waypoints.line_task import Line
 from tauhat.excitation.waypoints.moves import LARGEST_PART, SAME, Zone
+from tauhat.excitation.waypoints.ramps import Ramps
 from tauhat.excitation.waypoints.settings import WaypointSettings
+from tauhat.excitation.waypoints.time_law import RateLimits
 from tauhat.robots.kinematics import forward_kinematics
 from tauhat.robots.robot import Robot
 
@@ -39,10 +41,16 @@ class Bend(NamedTuple):
 
 
 class Neighbours(NamedTuple):
-    """Two ways that follow one another, and the part of the acceleration limits that may be used between them."""
+    """Two ways that follow one another.
+
+    ending, beginning : limits of their fractions
+    acceleration : part of the acceleration limits that may be used between them
+    """
 
     first: Way
     second: Way
+    ending: RateLimits
+    beginning: RateLimits
     acceleration: float
 
 
@@ -56,24 +64,34 @@ def bend(robot: Robot, pair: Neighbours, zone: Zone, settings: WaypointSettings,
     """
     first, second = pair.first, pair.second
     if isinstance(first, LineWay) and isinstance(second, LineWay):
-        shape = _line_shape(first.line, second.line, zone, settings)
+        shape = _shape(_line_bounds(first.line, second.line, zone), pair, settings.ramps)
         corner = _line_corner(first, second, shape, name)
         return Bend(corner, _least_of_lines(first.line, second.line, shape, (settings, pair.acceleration)))
     joint_corner = _joint_corner(robot, pair, zone, settings)
     return Bend(joint_corner, _least_of_joints(robot, joint_corner, settings, pair.acceleration))
 
 
-def _line_shape(first: Line, second: Line, zone: Zone, settings: WaypointSettings) -> CornerShape:
-    """Return the parts of two lines that lie in a zone: equal lengths of both, so that speed does not jump."""
-    lengths = [line.length for line in (first, second)]
-    moving = [length for length in lengths if length > SAME]
-    if not moving:
-        part = zone.part or LARGEST_PART
-        return CornerShape(ending=part, beginning=part, ramps=settings.ramps)
-    shorter = min(moving)
-    radius = zone.part * shorter if zone.part is not None else min(zone.radius or 0.0, LARGEST_PART * shorter)
-    parts = [radius / length if length > SAME else LARGEST_PART for length in lengths]
-    return CornerShape(ending=parts[0], beginning=parts[1], ramps=settings.ramps)
+def _line_bounds(first: Line, second: Line, zone: Zone) -> tuple[float, float]:
+    """Return the largest parts of two lines that lie in a zone."""
+    if zone.part is not None:
+        return zone.part, zone.part
+    radius = zone.radius or 0.0
+    bounds = [min(LARGEST_PART, radius / max(line.length, SAME)) for line in (first, second)]
+    return bounds[0], bounds[1]
+
+
+def _shape(bounds: tuple[float, float], pair: Neighbours, ramps: Ramps) -> CornerShape:
+    """Return the parts of two ways, within bounds, that are passed in one time at the speeds they have there.
+
+    These are the speeds at which a motion that stops at the target comes through the bound; so neither way has to wait
+    for the other.
+    """
+    speeds = [
+        min(limits.speed, float(np.sqrt(2.0 * limits.acceleration * bound)))
+        for limits, bound in zip((pair.ending, pair.beginning), bounds, strict=True)
+    ]
+    time = min(bounds[0] / speeds[0], bounds[1] / speeds[1])
+    return CornerShape(ending=time * speeds[0], beginning=time * speeds[1], ramps=ramps)
 
 
 def _line_corner(first: LineWay, second: LineWay, shape: CornerShape, name: str) -> LineCorner:
@@ -90,7 +108,7 @@ def _joint_corner(robot: Robot, pair: Neighbours, zone: Zone, settings: Waypoint
     """Return a corner of which the tool's way, as the joints take it, stays in the zone."""
     first, second = pair.first, pair.second
     if zone.part is not None:
-        shape = CornerShape(ending=zone.part, beginning=zone.part, ramps=settings.ramps)
+        shape = _shape((zone.part, zone.part), pair, settings.ramps)
         return JointCorner(first=first, second=second, shape=shape)
     radius, frame = zone.radius or 0.0, settings.tool_frame(robot)
     target = forward_kinematics(robot, second.start, frame=frame).translation
@@ -104,7 +122,7 @@ def _joint_corner(robot: Robot, pair: Neighbours, zone: Zone, settings: Waypoint
     beginning = _largest_inside(parts, reach(second.state(_still(parts)).q), radius)
     grid = _still(np.linspace(0.0, 1.0, _GRID))
     for _ in range(_MOST_SHRINKS):
-        shape = CornerShape(ending=ending, beginning=beginning, ramps=settings.ramps)
+        shape = _shape((ending, beginning), pair, settings.ramps)
         corner = JointCorner(first=first, second=second, shape=shape)
         if reach(corner.state(grid).q).max() <= radius:
             return corner

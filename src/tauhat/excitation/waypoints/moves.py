@@ -14,15 +14,15 @@ from tauhat.robots.kinematics import Pose
 
 SAME = 1e-9  # [m, rad] within which two targets are one
 _ORTHOGONAL = 1e-6  # of a target's rotation matrix
-LARGEST_PART = 0.5  # of a way that a zone takes: two zones may meet, never overlap
+LARGEST_PART = 0.4  # of a way that a zone takes: a fifth is left between two zones for changing speed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Zone:
-    """How near a motion passes by a target instead of stopping there: a radius, or a part of the shorter way.
+    """How near a motion passes by a target instead of stopping there: within a radius, or on a part of its ways.
 
-    radius : of the tool around the target [m]
-    part : of the ways to and from the target, at most 0.5
+    radius : of the tool around the target [m]; no more than 0.4 of either way is taken
+    part : of the ways to and from the target, at most 0.4
     """
 
     radius: float | None = None

@@ -66,7 +66,8 @@ def route(robot: Robot, start: FloatArray, moves: Sequence[Move], settings: Wayp
     ]
     bends: list[Bend | None] = []
     for k, (move, after) in enumerate(pairwise(moves)):
-        pair = Neighbours(first=ways[k], second=ways[k + 1], acceleration=min(move.acceleration, after.acceleration))
+        least = min(move.acceleration, after.acceleration)
+        pair = Neighbours(*ways[k : k + 2], *rates[k : k + 2], least)
         bends.append(
             None if move.zone is None else bend(robot, pair, move.zone, settings, f"the corner at move {k + 1}")
         )

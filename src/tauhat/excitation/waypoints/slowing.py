@@ -14,9 +14,12 @@ from tauhat.excitation.waypoints.ramps import Ramps
 from tauhat.excitation.waypoints.route import Route
 from tauhat.excitation.waypoints.schedule import Piece, Place, Tempo, first_tempo, schedule
 
-_PARTS = np.linspace(0.0, 1.0, 17)  # of a phase, at which limits are looked at
+_PARTS = 16  # of a phase, at whose ends limits are looked at
+_MOST_PARTS = 1024
 _ROUNDING = 1e-9  # part of a limit
 _RESERVE = 2e-4  # part of a limit kept for what lies between the parts on curves that are no polynomials
+_DOUBTFUL = 4.0 * _RESERVE  # what half the samples may miss: peaks of parabolas err by the third power of the step
+_NEAR = 0.9  # of a limit: what uses less need not be known exactly
 _MOST_ROUNDS = 100
 _PUSH = 1.0 + 1e-4  # slowed a little more than asked, since speeds at the ends of a way follow in the next round
 _REPORTED = 1e-6
@@ -93,13 +96,7 @@ def _excess(piece: Piece, limits: MotionLimits, joint_names: tuple[str, ...]) ->
     reserve = _ROUNDING if piece.curve.polynomial else -_RESERVE
     used = np.zeros((3, len(joint_names)))
     for phase in range(piece.law.begin.size):
-        t, course = piece.law.within(phase, _PARTS)
-        state = piece.curve.state(course)
-        _check_range(piece, state.q, limits, joint_names)
-        step = float(t[1] - t[0])
-        rows = [_peak(state.dq) / limits.velocity, _peak(state.ddq) / limits.acceleration]
-        rows.append(np.zeros(len(joint_names)) if limits.jerk is None else _peak_slope(state.ddq, step) / limits.jerk)
-        used = np.maximum(used, rows)
+        used = np.maximum(used, _used(piece, phase, limits, joint_names))
     stretches = np.maximum(used, 0.0) ** np.array([[1.0], [0.5], [1.0 / 3.0]])
     if used.max() <= 1.0 + reserve:
         return None
@@ -107,6 +104,27 @@ def _excess(piece: Piece, limits: MotionLimits, joint_names: tuple[str, ...]) ->
     name = ("speed", "acceleration", "jerk")[order]
     allowed = (1.0 + reserve) ** (1.0 / (order + 1.0))
     return _Excess(float(stretches.max() / allowed), f"{name} of {joint_names[joint]}")
+
+
+def _used(piece: Piece, phase: int, limits: MotionLimits, joint_names: tuple[str, ...]) -> FloatArray:
+    """Return how much of speed, acceleration and jerk one phase uses, (3, n_v).
+
+    The grid is refined while it and its every second sample disagree on what comes near a limit.
+    """
+    parts = _PARTS
+    while True:
+        t, course = piece.law.within(phase, np.linspace(0.0, 1.0, parts + 1))
+        state = piece.curve.state(course)
+        _check_range(piece, state.q, limits, joint_names)
+        used = np.zeros((3, len(joint_names)))
+        used[:2] = _peak(state.dq) / limits.velocity, _peak(state.ddq) / limits.acceleration
+        if limits.jerk is not None:
+            used[2] = _peak_slope(state.ddq, float(t[1] - t[0])) / limits.jerk
+        coarse = np.array([_peak(state.dq[::2]) / limits.velocity, _peak(state.ddq[::2]) / limits.acceleration])
+        doubtful = (np.abs(used[:2] - coarse) > _DOUBTFUL) & (used[:2] > _NEAR)
+        if piece.curve.polynomial or parts >= _MOST_PARTS or not doubtful.any():
+            return used
+        parts *= 2
 
 
 def _check_range(piece: Piece, q: FloatArray, limits: MotionLimits, joint_names: tuple[str, ...]) -> None:

@@ -143,8 +143,8 @@ def _meaning() -> Chapter:
     shares = (
         "An effect's share is what it removes of the squared residual on stretches of the log on which it was not "
         "fitted, beside the model's own parameters, refitted, and the effects before it. Noise is the variance of the "
-        "residual from period to period, less named effects that change over time; without a period only the white part "
-        "of the torque's noise is known, and what drives filter before they log is not even in that. Uncertain "
+        "residual from period to period, less named effects that change over time; without a period only the white "
+        "part of the torque's noise is known, and what drives filter before they log is not even in that. Uncertain "
         "parameters: what refitting them removes, as far as their error bars let expect; beyond that, they are others "
         "here."
     )
