@@ -191,9 +191,11 @@ def test_speeds_look_ahead_over_many_short_lines():
     angles = np.linspace(0.0, np.pi, 41)[1:]
     moves = [LineMove(target=shifted(0.08 * np.sin(a), 0.08 * (1 - np.cos(a))), zone=Zone(part=0.4)) for a in angles]
     motion = waypoint_motion(UR5E, HOME, moves, settings=SLOW)
-    t = np.linspace(0.4, motion.duration - 0.4, 100)
-    assert tool_speed(motion, t).min() > 0.098  # one line alone is 6 mm: too short for this speed
-    assert motion.duration < 0.08 * np.pi / 0.1 + 0.25
+    t = np.linspace(0.6, motion.duration - 0.6, 100)
+    assert tool_speed(motion, t).min() > 0.099
+    one = waypoint_motion(UR5E, HOME, [replace(moves[0], zone=None)], settings=SLOW)
+    assert tool_speed(one, np.linspace(0.1, 0.9, 20) * one.duration).max() < 0.06  # 6 mm are too short for 0.1 m/s
+    assert motion.duration < 0.3 * len(moves) * one.duration
 
 
 def test_a_dwell_stands_at_the_target():

@@ -151,6 +151,12 @@ def test_a_typical_experiment_has_every_cause_but_the_clock():
     assert {cause.key for cause in causes_of(case_of(typical_experiment(ARM)))} == set(CAUSES) - {"clock"}
 
 
+def test_noise_of_a_velocity_that_differs_from_joint_to_joint_is_noise():
+    case = case_of(planned(SensorErrors(velocity_noise=np.array([0.0, 1e-3]))))
+    assert "noise" in {cause.key for cause in causes_of(case)}
+    assert np.all(switched_off(case, ["noise"]).sensors.velocity_noise == 0.0)
+
+
 def synthetic(errors: dict[str, FloatArray], floor: FloatArray, seed: int) -> RobotBudget:
     """Return a robot whose error is a sum of vectors, one a cause, so that causes work together in pairs only."""
 

@@ -67,7 +67,7 @@ def route(robot: Robot, start: FloatArray, moves: Sequence[Move], settings: Wayp
     bends: list[Bend | None] = []
     for k, (move, after) in enumerate(pairwise(moves)):
         least = min(move.acceleration, after.acceleration)
-        pair = Neighbours(*ways[k : k + 2], *rates[k : k + 2], least)
+        pair = Neighbours(ways[k], ways[k + 1], rates[k], rates[k + 1], least)
         bends.append(
             None if move.zone is None else bend(robot, pair, move.zone, settings, f"the corner at move {k + 1}")
         )

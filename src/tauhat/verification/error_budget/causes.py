@@ -84,7 +84,8 @@ _CLOCK = ("sampling_jitter", "stamp_jitter", "lost_samples")
 
 
 def _noisy(case: Case) -> bool:
-    return _any_of(*_NOISE)(case) or bool(np.any(case.sensors.velocity_noise or 0.0))
+    of_velocity = case.sensors.velocity_noise
+    return _any_of(*_NOISE)(case) or (of_velocity is not None and bool(np.any(of_velocity)))
 
 
 def _without_noise(case: Case) -> Case:
