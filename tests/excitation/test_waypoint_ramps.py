@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -97,8 +99,7 @@ def test_a_move_of_one_joint_is_ruckigs_own_motion():
 def test_a_move_of_all_joints_is_ruckigs_motion_in_phase_where_one_joint_sets_all_limits():
     robot = load_robot("ur5e")
     velocity = motion_limits(robot).velocity
-    limits = motion_limits(robot, jerk=40.0 * velocity)
-    object.__setattr__(limits, "acceleration", 4.0 * velocity)
+    limits = replace(motion_limits(robot, jerk=40.0 * velocity), acceleration=4.0 * velocity)
     goal = np.array([0.9, -0.3, 1.4, 0.2, -0.8, 0.5])
     motion = waypoint_motion(
         robot, np.zeros(6), [JointMove(target=goal)], settings=WaypointSettings(limits=limits, ramps=JerkLimited())

@@ -195,7 +195,7 @@ def test_speeds_look_ahead_over_many_short_lines():
     assert tool_speed(motion, t).min() > 0.099
     one = waypoint_motion(UR5E, HOME, [replace(moves[0], zone=None)], settings=SLOW)
     assert tool_speed(one, np.linspace(0.1, 0.9, 20) * one.duration).max() < 0.06  # 6 mm are too short for 0.1 m/s
-    assert motion.duration < 0.3 * len(moves) * one.duration
+    assert motion.duration < 0.08 * np.pi / 0.1 + 0.4  # the way at full speed, and getting there
 
 
 def test_a_dwell_stands_at_the_target():
