@@ -8,8 +8,9 @@ from tauhat.errors import ModelError
 from tauhat.studies.crs_a465 import CrsA465Study
 from tauhat.studies.monte_carlo import MonteCarloStudy
 from tauhat.studies.study import Study
+from tauhat.studies.whole_rehearsal import WholeRehearsalStudy
 
-_KINDS: tuple[type[Study], ...] = (CrsA465Study, MonteCarloStudy)
+_KINDS: tuple[type[Study], ...] = (CrsA465Study, MonteCarloStudy, WholeRehearsalStudy)
 STUDIES: dict[str, type[Study]] = {kind.key: kind for kind in _KINDS}
 
 
