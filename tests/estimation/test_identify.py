@@ -115,6 +115,21 @@ def test_one_reversed_torque_warns_of_its_joint():
         identify(TRUTH.model, [replace(recording, tau=recording.tau * [1.0, -1.0])], processing=SETTINGS)
 
 
+def test_torque_without_friction_as_behind_a_gear_has_no_wrong_sign_by_chance():
+    drives = ("Fv", "Fc")
+    symbols = [parameter.symbol for parameter in TRUTH.model.parameters]
+    smooth = replace(TRUTH, standard=np.where(np.isin(symbols, drives), 0.0, TRUTH.standard))
+    chance = 0
+    for seed in range(12):
+        noise = 0.1 * np.random.default_rng(seed).standard_normal((4000, 2))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            estimate = identify(TRUTH.model, [smooth.recording(noise=noise)], processing=SETTINGS)
+        levels = [estimate.friction(part * estimate.top_speeds).torque for part in (0.2, 0.6)]
+        chance += bool(np.all(np.array(levels) < 0.0))
+    assert chance > 0  # it was negative on all joints, within its error bars
+
+
 def test_a_rich_motion_with_the_right_sign_does_not_warn():
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -8,12 +8,15 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from sample_arms import PLANAR, planar_truth
+from sample_arms import PLANAR, WIDTHS, Truth, planar_truth
+from tauhat.dynamics import torque_model
+from tauhat.dynamics.terms import Asymmetric
 from tauhat.errors import ModelError, RecordingError
 from tauhat.estimation import Estimate, identify
 from tauhat.excitation import static_motion
 from tauhat.recordings import Processing, Recording
 from tauhat.verification import StaticCheck, static_check
+from tauhat.verification.stands import _mean_error
 
 SETTINGS = Processing(cutoff=10.0, motion_cutoff=30.0)
 TRUTH = planar_truth()
@@ -93,6 +96,40 @@ def test_friction_beyond_the_models_is_found():
     assert [(finding.code, finding.joint) for finding in findings] == [("static_friction", "j2")]
 
 
+@pytest.mark.parametrize("left", [0.0, 0.5, 1.0])
+def test_a_right_model_of_friction_that_differs_by_direction_is_not_accused_however_much_of_it_is_left(left):
+    estimate, truth = differing()
+    way = np.sign(held().tau - np.array([gravity(pose) for pose in held().q]))
+    rigid = truth.torque(held().q, 0.0 * held().q, 0.0 * held().q)
+    log = replace(held(), tau=rigid + left * np.where(way > 0.0, 1.6, -0.8) + noise(9, len(way)))
+    assert static_check(estimate, [log]).findings == ()
+    for sign in (1.0, -1.0):
+        found = static_check(estimate, [replace(log, tau=log.tau + sign * np.array([1.5, 0.0]))]).findings
+        assert ("static_gravity", "j1") in {(finding.code, finding.joint) for finding in found}
+
+
+def test_a_passed_pose_has_all_of_the_friction_that_differs_by_direction():
+    estimate, truth = differing()
+    t = np.arange(0.0, 60.0, 0.005)
+    q = np.column_stack([0.5 + np.abs((t / 15.0) % 2.0 - 1.0), np.full_like(t, -0.4)])
+    q[t > 58.0, 0] += 0.4 * (1.0 - np.cos(2 * np.pi * (t[t > 58.0] - 58.0)))
+    tau = truth.torque(q, np.gradient(q, t, axis=0), 0.0 * q) + noise(7, len(t))
+    joint = static_check(estimate, [Recording(t=t, q=q, tau=tau)]).joints[0]
+    assert joint.poses > 20
+    assert not joint.held
+    assert abs(joint.gravity_difference) < 2 * joint.gravity_half < 0.2
+
+
+@lru_cache
+def differing() -> tuple[Estimate, Truth]:
+    """Return an arm whose friction differs by 0.8 Nm between the directions, and a right model of it."""
+    value = {"Ia": 0.05, "Fv+": 0.3, "Fv-": 0.2, "Fc+": 1.6, "Fc-": 0.8}
+    model = torque_model(ROBOT, "inertia,rotor,asymmetric").with_term(Asymmetric(widths=WIDTHS))
+    values = [value[parameter.symbol] for parameter in model.parameters[20:]]
+    truth = Truth(model=model, standard=np.concatenate([ROBOT.inertia.ravel(), values]))
+    return identify(model, [truth.recording(seed=1, noise=noise(1, 4000))], processing=SETTINGS), truth
+
+
 def test_a_motion_that_never_holds_says_so():
     (finding,) = static_check(estimate(), [TRUTH.recording(seed=2)]).findings
     assert (finding.code, finding.severity) == ("static_none", "note")
@@ -119,6 +156,13 @@ def test_slow_passes_of_a_single_joint_count_where_nothing_is_held():
     assert joint.poses > 20
     assert abs(joint.gravity_difference) < 2 * joint.gravity_half
     assert joint.friction == pytest.approx(joint.model_friction, abs=0.25)
+
+
+def test_error_bars_of_short_cells_are_as_wide_as_their_means_scatter():
+    rng = np.random.default_rng(3)
+    for count in (3, 4, 6):
+        squares = [_mean_error(rng.standard_normal((count, 2))) ** 2 for _ in range(2000)]
+        assert np.mean(squares) * count == pytest.approx(1.1, abs=0.15)
 
 
 def test_results_are_plain_data():

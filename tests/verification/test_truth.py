@@ -68,6 +68,27 @@ def test_an_estimate_from_a_noisy_log_is_nearer_to_the_truth_than_the_log(
     assert compared.to_dict()["base_parameters"] == 13
 
 
+def test_a_delay_of_the_log_that_the_estimate_makes_up_for_is_none_of_the_truths(
+    simulated: tuple[TorqueModel, Simulation],
+) -> None:
+    from dataclasses import replace
+
+    from tauhat.recordings import Processing
+
+    model, simulation = simulated
+    truth, late = simulation.truth, 5
+    q, tau = truth.q[late:], truth.tau[:-late]
+    log = replace(simulation.recording, t=truth.reference.t[late:], q=q, dq=None, tau=tau)
+    step = float(np.diff(truth.reference.t[:2])[0])
+    settings = Processing(cutoff=8.0, motion_cutoff=24.0)
+    estimates = [
+        identify(model, [log if delay else simulation.recording], processing=replace(settings, delay=delay))
+        for delay in (0.0, -late * step)
+    ]
+    at_once, made_up_for = (compare_with_truth(estimate, truth).relative_rms for estimate in estimates)
+    assert made_up_for < 1.2 * at_once + 1e-3
+
+
 def test_a_wrong_truth_is_seen(simulated: tuple[TorqueModel, Simulation], estimate: Estimate) -> None:
     from dataclasses import replace
 

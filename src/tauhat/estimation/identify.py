@@ -31,6 +31,7 @@ from tauhat.recordings.recording import Recording
 _DEAR = 0.02  # share of the residual that constraints may cost before the bound on rotor inertias is looked at
 _ROTOR = "Ia"
 _SURE = 5.0  # standard errors below zero at which the friction of a single joint surely is negative
+_LIKELY = 2.0  # the same where most joints say so; behind a gear no friction is sensed, and its sign is chance
 DOUBTFUL_CONDITION = 300.0  # scaled condition number above which a motion does not support its model
 
 
@@ -211,10 +212,10 @@ def _warn_of_still_joints(seen: Seen) -> None:
 
 
 def _warn_of_negative_friction(estimate: Estimate, seen: Seen) -> None:
-    """Warn when friction drives most joints, or single ones surely, at a fifth and three fifths of their top speeds."""
+    """Warn when friction likely drives most joints, or single ones surely, at a fifth and three fifths of top speed."""
     speeds, n_v = np.maximum(seen.top_speeds, np.finfo(float).tiny), estimate.robot.n_v
     levels = [estimate.friction(part * speeds) for part in (0.2, 0.6)]
-    negative = np.all([level.torque < 0.0 for level in levels], axis=0)
+    negative = np.all([level.torque < -_LIKELY * level.standard_errors for level in levels], axis=0)
     surely = np.all([level.torque < -_SURE * level.standard_errors for level in levels], axis=0)
     most = bool(negative.sum() > n_v / 2)
     joints = np.flatnonzero(negative if most else surely)

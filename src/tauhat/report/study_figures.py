@@ -14,6 +14,7 @@ from tauhat.studies.study import Chart, Series
 
 _BAND_OPACITY = 0.18
 _HEIGHT = 420
+_MOST_MARKED = 60  # points of a line that are marked
 _WIDTH_PER_VALUE = 7  # [px] of a value over a name
 _MOST_TICKS = 12  # places that are all marked on a logarithmic axis
 _ONE_TWO_FIVE = "D2"  # Plotly's word for ticks at 1, 2, 5, 10
@@ -70,8 +71,9 @@ def _traces(chart: Chart, series: Series, colour: str) -> list[Any]:
             )
         ]  # fmt: skip
     x = np.array(series.x, dtype=np.float64)
+    mode = "lines+markers" if x.size <= _MOST_MARKED else "lines"
     line = go.Scatter(
-        x=x, y=y, name=name, mode="lines+markers", line={"color": colour, "width": 2}, legendgroup=name,
+        x=x, y=y, name=name, mode=mode, line={"color": colour, "width": 2}, legendgroup=name,
         hovertemplate=_HOVER,
     )  # fmt: skip
     return [*_band(x, low, high, colour=colour, name=name), line]

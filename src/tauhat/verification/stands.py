@@ -126,4 +126,4 @@ def _mean_error(tau: FloatArray) -> FloatArray:
     """Return the standard error of the mean of correlated rows (n, n_v), (n_v,)."""
     centred = tau - tau.mean(axis=0)
     redundancy = np.array([correlated_rows(column) for column in centred.T])
-    return np.asarray(np.sqrt(np.mean(centred**2, axis=0) * redundancy / len(tau)))
+    return np.asarray(np.sqrt(np.var(tau, axis=0, ddof=1) * redundancy / len(tau)))

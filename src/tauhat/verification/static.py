@@ -6,7 +6,9 @@ Friction holds back against the way a joint came, so that
 joint by joint, without any dynamics or filter. Both are compared with the model's, with the error bars of both.
 In a pose that is held friction may have anything between the two signs of its value, as a controller comes to rest:
 half the difference is then a lower bound of friction, and only a model that has less is contradicted. Poses that are
-passed slowly show friction itself. Half the sum is gravity only as far as both sides relax alike.
+passed slowly show friction itself. Half the sum is gravity only as far as both sides relax alike. Of friction that
+differs between the directions half the difference is in it: all where a pose is passed, and where it is held as much of
+it, from nothing to all, as brings the model nearest.
 """
 
 from __future__ import annotations
@@ -155,7 +157,11 @@ def _pair(estimate: Estimate, sides: tuple[list[Stand], list[Stand]], joint: int
     up, down = (float(np.mean([stand.tau[joint] for stand in side])) for side in sides)
     spreads = [float(np.linalg.norm([stand.error[joint] for stand in side])) / len(side) for side in sides]
     error = 0.5 * float(np.linalg.norm(spreads))
-    gravity, friction = _model_rows(estimate, pose, joint, speed)
+    gravity, leaning, friction = _model_rows(estimate, pose, joint, speed)
+    left = (
+        _left(0.5 * (up + down) - float(gravity @ estimate.values), float(leaning @ estimate.values)) if held else 1.0
+    )
+    gravity = gravity + left * leaning
     return StaticPair(
         joint=joint, position=float(pose[joint]), speed=speed, held=held,
         gravity=0.5 * (up + down), gravity_error=error,
@@ -169,11 +175,19 @@ def _deviation(estimate: Estimate, row: FloatArray) -> float:
     return float(np.sqrt(max(float(row @ estimate.covariance @ row), 0.0)))
 
 
-def _model_rows(estimate: Estimate, pose: FloatArray, joint: int, speed: float) -> tuple[FloatArray, FloatArray]:
-    """Return the rows (n_b,) whose product with the parameters is the model's gravity and friction in the pose."""
+def _left(difference: float, leaning: float) -> float:
+    """Return which part of friction's half sum, 0 to 1, brings the model nearest to a pose that is held."""
+    return float(np.clip(difference / leaning, 0.0, 1.0)) if leaning else 0.0
+
+
+def _model_rows(
+    estimate: Estimate, pose: FloatArray, joint: int, speed: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return rows (n_b,) for the parameters: gravity in the pose, half of friction's sum and half of its difference."""
     brakes = braking_parameters(estimate.model)[estimate.base.independent]
     up, down = (_arriving(estimate, pose, joint, sign * speed) for sign in (1.0, -1.0))
-    return np.where(brakes, 0.0, 0.5 * (up + down)), np.where(brakes, 0.5 * (up - down), 0.0)
+    mean, friction = 0.5 * (up + down), np.where(brakes, 0.5 * (up - down), 0.0)
+    return np.where(brakes, 0.0, mean), np.where(brakes, mean, 0.0), friction
 
 
 def _arriving(estimate: Estimate, pose: FloatArray, joint: int, speed: float) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ class TruthComparison:
     values : (n_b,) true base parameters
     inside : (n_b,) whether the truth lies in the estimate's 95 % interval
     relative_rms : norm of the error over norm of the true, noise-free torque, all joints stacked, through the filters
-        of the estimate
+        of the estimate without its delay: the truth has none
     joints : the same joint by joint
     """
 
@@ -63,14 +63,15 @@ def standard_parameters(model: TorqueModel, truth: TrueParameters) -> FloatArray
 
 
 def compare_with_truth(estimate: Estimate, truth: Truth) -> TruthComparison:
-    """Return how far the estimate's parameters, and its torque along a motion, are from the truth.
+    """Return how far the estimate's parameters, and its torque along a motion, are from the truth, that of the motors.
 
     Parameters
     ----------
     truth : of a recording, best one that was not fitted
     """
     values = estimate.base.projection @ standard_parameters(estimate.model, truth.parameters)
-    prediction = predict_recording(estimate, _noise_free(estimate, truth), processing=estimate.processing)
+    at_once = replace(estimate.processing, delay=0.0)
+    prediction = predict_recording(estimate, _noise_free(estimate, truth), processing=at_once)
     return TruthComparison(
         values=read_only(values),
         inside=read_only(np.abs(estimate.values - values) <= estimate.half_intervals(confidence=CONFIDENCE)),

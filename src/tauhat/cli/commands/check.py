@@ -78,5 +78,14 @@ def _view(checked: Sequence[CheckedLog]) -> Iterator[RenderableType]:
         joints = "one joint" if log.n_v == 1 else f"{log.n_v} joints"
         yield Text.assemble((log.path, "bold"), f": {log.n_t} samples, {joints}, {signals}")
         yield findings_view(item.findings)
-        verdict = ("The log can be used.", "green") if item.usable else ("The log cannot be used as it is.", "bold red")
-        yield Text.assemble(verdict, "\n")
+        yield Text.assemble(_verdict(item), "\n")
+
+
+def _verdict(checked: CheckedLog) -> tuple[str, str]:
+    """Return words and style."""
+    doubts = sum(finding.severity == "warning" for finding in checked.findings)
+    if not checked.usable:
+        return "The log cannot be used as it is.", "bold red"
+    if doubts:
+        return f"The log can be used; mind the {'warning' if doubts == 1 else f'{doubts} warnings'} above.", "yellow"
+    return "The log can be used.", "green"

@@ -35,20 +35,25 @@ class Models:
     first : estimate with the terms that were asked for
     verified : the first on the unseen motions, in the order of `UNSEEN`
     residuals : what the first leaves on the searched one
-    added : terms that were named there and are in the second
+    named : terms that are named there and that the first lacks
     final, final_verified, final_truth : the second model, and its errors against logs and against the true torque; the
-        first where nothing with a term was named, or where the second could not be identified
-    failure : why there is no second model although terms were named; empty otherwise
+        first where nothing with a term was named, or where the second is not taken
+    failure : why the model with the named terms is not taken; empty otherwise
     """
 
     first: Estimate
     verified: Verification
     residuals: LogResiduals
-    added: tuple[str, ...]
+    named: tuple[str, ...]
     final: Estimate
     final_verified: Verification
     final_truth: tuple[TruthComparison, ...]
     failure: str = ""
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Terms that the final model has and the first has not."""
+        return () if self.failure else self.named
 
     def log(self, name: MotionName) -> LogPrediction:
         """Return the final model's prediction of an unseen motion."""
@@ -110,24 +115,41 @@ def modelled(scene: Scene, fitted: Recording, unseen: tuple[Simulation, ...], *,
     first = identify(torque_model(scene.robot, terms), [fitted], estimator=method)
     verified = verify(first, logs)
     (residuals,) = residual_tests(first, [logs[UNSEEN.index(SEARCHED)]])
-    named = tuple(dict.fromkeys(effect.term for _, effect in residuals.ranked if effect.term))
     known = [term.key for term in first.model.terms]
-    added, final, failure = tuple(term for term in named if term not in known), first, ""
+    named = [term for joint in residuals.joints for effect in joint.missing for term in _terms(effect.term)]
+    added = tuple(term for term in dict.fromkeys(named) if term not in known)
+    final, final_verified, failure = first, verified, ""
     if added:
         try:
             final = identify(torque_model(scene.robot, [*known, *added]), [fitted], estimator=method)
+            final_verified = verify(final, logs)
+            failure = _worse(verified, final_verified)
         except TauhatError as error:
-            added, failure = (), f"{', '.join(added)}: {error}"
+            failure = f"it could not be identified: {error}"
+    if failure:
+        final, final_verified = first, verified
     return Models(
         first=first,
         verified=verified,
         residuals=residuals,
-        added=added,
+        named=added,
         final=final,
-        final_verified=verify(final, logs),
+        final_verified=final_verified,
         final_truth=tuple(compare_with_truth(final, done.truth) for done in unseen),
         failure=failure,
     )
+
+
+def _worse(first: Verification, second: Verification) -> str:
+    """Return why the second model is not taken, from the log that was searched anyway; empty where it is better."""
+    before, after = (verified.logs[UNSEEN.index(SEARCHED)].relative_rms for verified in (first, second))
+    if after < before:
+        return ""
+    return f"on the {SEARCHED} it is off by {100 * after:.3g} %, the model without them by {100 * before:.3g} %"
+
+
+def _terms(listed: str) -> list[str]:
+    return [term.strip() for term in listed.split(",") if term.strip()]
 
 
 def pooled(logs: list[LogPrediction]) -> float:

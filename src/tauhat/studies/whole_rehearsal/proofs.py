@@ -76,8 +76,9 @@ class Tuned(Proof):
         law = PDFeedforward(kp=hand.kp, kd=hand.kd, torque_limit=hand.torque_limit)
         found = identified_torque(self.estimate)
 
-        def equipped(law: TrackingLaw) -> Controller:
-            return ModelFeedforward(torque=found, law=law)
+        def equipped(tried: TrackingLaw) -> Controller:
+            shaped = PDFeedforward(kp=tried.kp, kd=tried.kd, torque_limit=tried.torque_limit)
+            return ModelFeedforward(torque=found, law=shaped)
 
         return tune_gains(
             tuned_on, law, unseen=judged_on, search=GainSearch(trials=self.trials), equipped=equipped

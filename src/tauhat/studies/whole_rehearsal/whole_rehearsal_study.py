@@ -50,12 +50,12 @@ class WholeRehearsalStudy(Study):
     title: ClassVar[str] = "An arm rehearsed end to end"
     robot: str = "ur5e"
     seconds: float = 10.0
-    unseen_seconds: float = 8.0
+    unseen_seconds: float = 12.0
     poses: int = 4
     trials: int = 16
     payload: float = 2.0
     seeds: int = 2
-    terms: str = "robust"
+    terms: str = "plain"
     estimator: str = "wls"
     robot_seed: int = 1
 
@@ -72,7 +72,7 @@ class WholeRehearsalStudy(Study):
     def quick(cls) -> WholeRehearsalStudy:
         """Return settings of a few seconds on a planar arm of two joints."""
         return cls(
-            robot="two_link", seconds=4.0, unseen_seconds=4.0, poses=2, trials=3, payload=1.0, seeds=1, terms="plain"
+            robot="two_link", seconds=2.5, unseen_seconds=3.0, poses=2, trials=3, payload=1.0, seeds=1
         )  # fmt: skip
 
     def run(self, workers: Workers, *, tell: Callable[[str], None] = lambda _: None) -> StudyResult:

@@ -1,0 +1,15 @@
+"""Planned motions as programs for real controllers, and read back: URScript, KRL, RAPID, FANUC LS, via-point tables."""
+
+from tauhat.export.programs.dialect import DIALECTS, Dialect, program_named
+from tauhat.export.programs.program import ControllerJoints, Program, ProgramSettings, ProgramText, signed_joints
+
+__all__ = [
+    "DIALECTS",
+    "ControllerJoints",
+    "Dialect",
+    "Program",
+    "ProgramSettings",
+    "ProgramText",
+    "program_named",
+    "signed_joints",
+]
