@@ -61,7 +61,7 @@ class Dialect:
             raise ExportError(
                 "a motion that does not come back cannot repeat",
                 where=self.title,
-                got=f"{away:.3g} away",
+                got=f"{away:.3g} away from its start",
                 remedy=remedy,
             )
         unsaid = (*self.unsaid, *_left_to_the_controller(motion))
@@ -101,8 +101,8 @@ class Dialect:
                 f"{self.title} programs", where=robot.name, expected=expected, got=got, remedy="write a table"
             )
         if settings.joints is not None and settings.joints.offset.size != robot.n_v:
-            got = settings.joints.offset.size
-            raise ExportError("controller joints of another robot", where=robot.name, expected=robot.n_v, got=got)
+            size = settings.joints.offset.size
+            raise ExportError("controller joints of another robot", where=robot.name, expected=robot.n_v, got=size)
 
 
 def _warning(cell: Cell, motion: WaypointMotion) -> tuple[str, ...]:
@@ -124,7 +124,8 @@ def _left_to_the_controller(motion: WaypointMotion) -> tuple[str, ...]:
 
 DIALECTS: tuple[Dialect, ...] = (
     Dialect(
-        key="urscript", title="URScript", ending=".script", lines=urscript.write, parse=urscript.read, unsaid=urscript.UNSAID
+        key="urscript", title="URScript", ending=".script", lines=urscript.write, parse=urscript.read,
+        unsaid=urscript.UNSAID,
     ),
     Dialect(key="krl", title="KRL", ending=".src", lines=krl.write, parse=krl.read, unsaid=krl.UNSAID),
     Dialect(key="rapid", title="RAPID", ending=".mod", lines=rapid.write, parse=rapid.read, unsaid=rapid.UNSAID),

@@ -1,7 +1,7 @@
 """TP programs for FANUC as LS text: J in per cent, L in mm/sec, CNT and FINE; positions behind the moves, W, P, R.
 
-CNT tells how much of its speed the arm keeps at a target, not where it turns off. Read as CNT100 = the largest part of a
-way that a zone takes here, 0.4, and in proportion below.
+CNT tells how much of its speed the arm keeps at a target, not where it turns off. CNT100 is taken for the largest part
+of a way that a zone has here, 0.4, and less in proportion.
 
 Source: FANUC Robotics, "SYSTEM R-30iA / R-30iB, HandlingTool, setup and operations manual", program structure.
 """
@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -107,7 +106,7 @@ def _position(cell: Cell, leg: Leg) -> Iterator[str]:
     if not isinstance(move.target, Pose):
         yield from _joints(cell, leg.number + 1, move.target)
         return
-    pose = pose_in_degrees(cell.target_pose(move)) if isinstance(move, LineMove) else np.zeros(6)
+    pose = pose_in_degrees(cell.shown_pose(move.target))
     x, y, z = (decimal(value, MILLIMETRES) for value in pose[:3])
     r, p, w = (decimal(value, DEGREES) for value in pose[3:])
     yield from (f"P[{leg.number + 1}]{{", "  GP1:")
@@ -125,13 +124,13 @@ def _joints(cell: Cell, number: int, q: FloatArray) -> Iterator[str]:
     yield "};"
 
 
-@dataclass(slots=True, kw_only=True)
 class _Positions:
     """Positions by number: numbers as they come, six when complete, and whether they are of joints."""
 
-    values: dict[int, list[float]] = field(default_factory=dict)
-    joints: dict[int, bool] = field(default_factory=dict)
-    current: int = 0
+    def __init__(self) -> None:
+        self.values: dict[int, list[float]] = {}
+        self.joints: dict[int, bool] = {}
+        self.current = 0
 
     def open(self, match: re.Match[str]) -> None:
         self.current = int(match[1])
@@ -148,7 +147,7 @@ class _Positions:
             raise ExportError("numbers outside a position")
         self.values[self.current] += [float(text) for text in match.groups()]
 
-    def close(self, match: re.Match[str]) -> None:
+    def close(self, _: re.Match[str]) -> None:
         found = self.values.get(self.current, [])
         if len(found) != 6:
             raise ExportError(f"P[{self.current}]", expected="six numbers", got=len(found))

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from tauhat.arrays import FloatArray
 from tauhat.errors import ExportError
 from tauhat.excitation.waypoints.moves import JointMove, LineMove, Zone
 from tauhat.export.programs.angles import pose_in_degrees, pose_of_degrees
@@ -90,7 +91,7 @@ def _percentages(speed: int, acceleration: int) -> tuple[str, str]:
     return f"BAS(#VEL_PTP, {speed})", f"BAS(#ACC_PTP, {acceleration})"
 
 
-def _ptp(cell: Cell, target: np.ndarray) -> str:  # type: ignore[type-arg]
+def _ptp(cell: Cell, target: FloatArray) -> str:
     values = zip(_AXES, np.rad2deg(cell.shown(target)), strict=True)
     return f"PTP {{{', '.join(f'{name} {decimal(value, DEGREES)}' for name, value in values)}}}"
 
@@ -115,7 +116,7 @@ def _check_zones(legs: Sequence[Leg]) -> None:
             raise ExportError("KRL has no word for this zone", where=leg.where, expected=expected)
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Reader:
     """The values that hold until they are set again."""
 

@@ -1,6 +1,6 @@
 """RAPID for ABB: MoveAbsJ and MoveL with speed data and zone data; quaternions w, x, y, z.
 
-Speed data are those of the tool, also on joint moves; parts of the joint limits are said with VelSet and AccSet on vmax.
+Speed data are those of the tool, on joint moves too; parts of the joint limits are said with VelSet and AccSet on vmax.
 
 Source: ABB Robotics, "Technical reference manual: RAPID instructions, functions and data types".
 """
@@ -131,7 +131,7 @@ def _zone_word(leg: Leg) -> str:
     return f"[FALSE,{decimals([radius, 1.5 * radius, 1.5 * radius, turn, 1.5 * radius, turn], MILLIMETRES)}]"
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Reader:
     """The values that hold until they are set again."""
 
@@ -147,7 +147,7 @@ class _Reader:
             raise ExportError("PathAccLim with two values", got=f"{match[1]} and {match[2]}")
         self.values["PathAccLim"] = float(match[1])
 
-    def unlimit(self, match: re.Match[str]) -> None:
+    def unlimit(self, _: re.Match[str]) -> None:
         self.values.pop("PathAccLim", None)
 
     def joint(self, match: re.Match[str]) -> None:
@@ -200,6 +200,7 @@ def read(cell: Cell, text: str) -> Program:
     reader = _Reader(cell=cell, gathered=gathered, values={})
     ending = rf"tool{cell.settings.tool} \\WObj:=wobj0;"
     zone = rf"(fine|z\d{{1,3}}|\[FALSE{f',{_plain()}' * 6}\])"
+    pose = rf"\[{_list(3)}\],\[{_list(4)}\]"
     rules = [
         rule(r"MODULE [A-Za-z]\w*|PROC [A-Za-z]\w*\(\)|ConfL \\Off;", passed),
         rule(rf"(VelSet) {NUMBER}, {_MOST_TOOL_SPEED};", reader.put),
@@ -207,10 +208,7 @@ def read(cell: Cell, text: str) -> Program:
         rule(r"PathAccLim FALSE, FALSE;", reader.unlimit),
         rule(rf"PathAccLim TRUE \\AccMax:={NUMBER}, TRUE \\DecelMax:={NUMBER};", reader.limit),
         rule(rf"MoveAbsJ \[\[{_list(6)}\],{re.escape(_NO_AXES)}\] \\NoEOffs, vmax, {zone}, {ending}", reader.joint),
-        rule(
-            rf"MoveL \[\[{_list(3)}\],\[{_list(4)}\],\[0,0,0,0\],{re.escape(_NO_AXES)}\], \[{_list(4)}\], {zone}, {ending}",
-            reader.line,
-        ),
+        rule(rf"MoveL \[{pose},\[0,0,0,0\],{re.escape(_NO_AXES)}\], \[{_list(4)}\], {zone}, {ending}", reader.line),
         rule(rf"WaitTime {NUMBER};", lambda match: gathered.dwell(float(match[1]))),
         rule(r"FOR i FROM 1 TO (\d{1,6}) DO", lambda match: gathered.loop(int(match[1]))),
         rule(r"ENDFOR", lambda _: gathered.close()),

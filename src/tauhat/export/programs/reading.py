@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from tauhat.arrays import FloatArray
@@ -69,7 +69,6 @@ def scan(text: str, rules: Sequence[Rule], *, language: str, comment: str) -> No
             raise ExportError(str(error), where=where) from error
 
 
-@dataclass(slots=True, kw_only=True)
 class Gathered:
     """What the lines of a program have said so far.
 
@@ -78,12 +77,11 @@ class Gathered:
     finished : whether the program's own end was read, so that none is cut off
     """
 
-    start: FloatArray | None = None
-    moves: list[Move] = field(default_factory=list)
-    repeats: int = 1
-    looped: bool = False
-    closed: bool = False
-    finished: bool = False
+    def __init__(self) -> None:
+        self.start: FloatArray | None = None
+        self.moves: list[Move] = []
+        self.repeats = 1
+        self.looped = self.closed = self.finished = False
 
     def begin(self, start: FloatArray) -> None:
         """Take the position in which the motion begins."""

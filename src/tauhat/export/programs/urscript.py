@@ -150,7 +150,7 @@ def read(cell: Cell, text: str) -> Program:
         gathered.add(move)
         here[0] = cell.line_end(here[0], move)
 
-    def end(match: re.Match[str]) -> None:
+    def end(_: re.Match[str]) -> None:
         if gathered.looped and not gathered.closed:
             gathered.close()
         else:

@@ -15,7 +15,6 @@ from tauhat.verification.prediction import LogPrediction
 _POINTS = 240  # of a line in a drawing
 _SHOWN: MotionName = "point to point"  # the unseen motion whose torque is drawn
 _WINDOW = 5.0  # [s] of it
-_NAMED = 12  # rows of the effects that residuals name
 
 
 def chapters_of(found: Findings) -> tuple[Chapter, ...]:
@@ -228,7 +227,6 @@ def _torque_series(log: LogPrediction, joint: int, rows: IntArray) -> tuple[Seri
 
 def _residuals(found: Findings) -> Chapter:
     models = found.models
-    named = models.residuals.ranked
     text = [
         (
             f"The residual of the first model on the {SEARCHED} is searched for a catalogue of effects. An effect is "
@@ -243,15 +241,19 @@ def _residuals(found: Findings) -> Chapter:
         )
     else:
         text.append("Nothing is named that a term of the library would describe and the model does not have.")
+    missing = [("missing", joint.name, effect) for joint in models.residuals.joints for effect in joint.missing]
+    changed = [("changed", joint.name, effect) for joint in models.residuals.joints for effect in joint.changed]
     rows = tuple(
-        (joint, effect.effect, effect.term or "none", 100.0 * effect.share, ", ".join(effect.alternatives))
-        for joint, effect in named[:_NAMED]
+        (kind, joint, effect.effect, effect.term or "none", 100.0 * effect.share)
+        for group in (missing, changed)
+        for kind, joint, effect in sorted(group, key=lambda row: -row[2].share)
     )
     table = Table(
-        title="Effects that the residual holds, the strongest first",
-        header=("joint", "effect", "term", "share of the squared residual [%]", "or as well"),
+        title="Effects that the residual holds",
+        header=("kind", "joint", "effect", "term", "share of the squared residual [%]"),
         rows=rows,
-        note=f"{len(named)} were named in all." if len(named) > _NAMED else "",
+        note="Missing: the model has no such term. Changed: parameters that are others here than in the fit, as they "
+        "are where the fit has bent them to make up for a missing term.",
     )
     return Chapter(title="5. What the residual still holds", text=tuple(text), tables=(table,) if rows else ())
 

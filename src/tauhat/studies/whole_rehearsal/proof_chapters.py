@@ -10,6 +10,7 @@ from tauhat.studies.whole_rehearsal.findings import Findings
 from tauhat.studies.whole_rehearsal.proofs import BANDWIDTH
 
 _MILLI = 1e3
+_LEAST = 0.05  # of the largest gravity torque, from which a joint is drawn
 
 
 def tracking(found: Findings) -> Chapter:
@@ -17,10 +18,8 @@ def tracking(found: Findings) -> Chapter:
     names, unit = found.scene.robot.joint_names, _milli_unit(found)
     bend = _MILLI * np.array(found.bend)
     runs = found.tracking.runs
-    rows = [
-        (run.name, run.knows, *(_MILLI * run.rms).tolist(), _MILLI * float(np.linalg.norm(run.rms))) for run in runs
-    ]
-    rows.append(("(bending of the joints)", "", *bend.tolist(), float(np.linalg.norm(bend))))
+    rows = [(run.name, *(_MILLI * run.rms).tolist(), _MILLI * float(np.linalg.norm(run.rms))) for run in runs]
+    rows.append(("(bending of the joints)", *bend.tolist(), float(np.linalg.norm(bend))))
     text = (
         (
             f"Method 2: the model drives. The simulated robot follows the task path under controllers with the same "
@@ -28,12 +27,12 @@ def tracking(found: Findings) -> Chapter:
         ),
         (
             "The error is that of the link. Joints bend, encoders sit on the motors, and what a joint bends by no "
-            "controller here can see: the last row of the table is what even a perfect model leaves."
+            "controller here can see: the last row of the table is how much that is."
         ),
     )
     table = Table(
-        title="Tracking error on the task path",
-        header=("controller", "model", *(f"{name} [{unit}]" for name in names), f"norm [{unit}]"),
+        title=f"Tracking error on the task path [{unit}]",
+        header=("controller", *names, "norm"),
         rows=tuple(rows),
         note="Root mean square." + _failures(found),
     )
@@ -41,9 +40,8 @@ def tracking(found: Findings) -> Chapter:
         title="Tracking error by controller", kind="bars", x_title="joint", y_title=f"error, root mean square [{unit}]",
         series=(
             *(Series(name=run.name, x=names, y=tuple((_MILLI * run.rms).tolist())) for run in runs),
-            Series(name="bending of the joints", x=names, y=tuple(bend.tolist())),
         ),
-        logarithmic=("y",), note="A logarithmic axis: a step down of one decade is a tenth of the error.",
+        logarithmic=("y",), note="The axis is logarithmic: from 10 to 1 is a tenth of the error.",
     )  # fmt: skip
     return Chapter(title="6. Method 2: the model in motion", text=text, tables=(table,), charts=(chart,))
 
@@ -120,7 +118,9 @@ def static(found: Findings) -> Chapter:
         note="Friction of a held pose is a lower bound: only a model with less is contradicted. Below zero, the torque "
         "has relaxed past the middle.",
     )
-    pairs = [pair for pair in check.pairs if pair.held]
+    heaviest = max(joint.gravity_rms for joint in check.joints)
+    shown = [place for place, joint in enumerate(check.joints) if joint.poses and joint.gravity_rms > _LEAST * heaviest]
+    pairs = [pair for place in shown for pair in check.pairs if pair.joint == place]
     places = tuple(f"{names[pair.joint]} at {pair.position:.2f}" for pair in pairs)
     series = (
         Series(name="measured", x=places, y=tuple(pair.gravity for pair in pairs)),
@@ -128,7 +128,8 @@ def static(found: Findings) -> Chapter:
     )
     chart = Chart(
         title="Gravity in held poses", kind="bars", x_title="joint and its position [rad or m]",
-        y_title=f"torque [{unit}]", series=series, note="Every pose gives one pair of bars for each joint.",
+        y_title=f"torque [{unit}]", series=series,
+        note="A pair of bars for each held pose, on the joints that carry a twentieth of the most or more.",
     )  # fmt: skip
     return Chapter(title="8. At rest", text=tuple(text), tables=(table,), charts=(chart,) if pairs else ())
 
@@ -145,6 +146,7 @@ def payload(found: Findings) -> Chapter:
             f"Error of the loaded log's torque: {100 * check.ignored:.3g} % with the payload ignored, "
             f"{100 * check.found:.3g} % with the one that was found."
         ),
+        _constants(found),
     )
     rows: list[tuple[Cell, ...]] = []
     for number in check.numbers:
@@ -162,6 +164,19 @@ def payload(found: Findings) -> Chapter:
     return Chapter(title="9. A payload that is known", text=text, tables=(table,))
 
 
+def _constants(found: Findings) -> str:
+    """Return how far the mass is off beside the errors of the torque constants, which only a rehearsal knows."""
+    mass, factor = found.payload.numbers[0], found.scene.experiment.settings.sensors.torque_factor
+    off = 100.0 * (np.asarray(factor) * np.ones(found.scene.robot.n_v) - 1.0)
+    wrong = f"{off.min():+.2g} to {off.max():+.2g} %"
+    if mass.found is None:
+        return f"The motion does not show the mass. The torque constants are off by {wrong}."
+    return (
+        f"The mass is off by {100.0 * (mass.found / mass.known - 1.0):+.2g} %; the torque constants of this robot "
+        f"are off by {wrong}. A log in wrong newton metres makes wrong kilograms."
+    )
+
+
 def budget(found: Findings) -> Chapter:
     """Return the ranked causes and what to do about them."""
     causes, remedies, *_ = budget_chapters(found.budget_settings, found.budget)
@@ -169,8 +184,8 @@ def budget(found: Findings) -> Chapter:
     start = (
         f"The same experiment on {settings.seeds} other true robots, identified by the {settings.terms} model with "
         "each cause of error switched off alone and on alone. Here the joints are "
-        f"{settings.warmer:+g} K from the fitted log on the unseen motion; in the chapters above they are as cold as "
-        "they were."
+        f"{settings.warmer:g} K warmer on the unseen motion than in the fitted log; in the chapters above they are "
+        "as cold as they were."
     )
     return Chapter(
         title="10. Where the error is from", text=(start, *causes.text, *remedies.text), tables=causes.tables,
