@@ -44,12 +44,13 @@ from tauhat.blas import single_threaded
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.dynamics.motion import Motion
 from tauhat.errors import ModelError
+from tauhat.estimation.evidence import Evidence
 from tauhat.estimation.filters.beginning import Beginning, FirstStretch
 from tauhat.estimation.filters.outcome import Found, Recursion, residual_weights, solution_of
 from tauhat.estimation.filters.samples import motion_samples, refuse_memory, row_samples
 from tauhat.estimation.friction import braking_parameters
 from tauhat.estimation.problem import Problem
-from tauhat.estimation.solution import Solution
+from tauhat.estimation.solution import Solution, joint_residuals
 from tauhat.recordings.processing import Stretch
 
 _LOST = 1e3  # the model is lost when its speed is off by this many times the robot's largest
@@ -212,11 +213,13 @@ class AdaptiveInputError(Recursion):
             total, count = np.zeros_like(values), 0
             for recording, motion in zip(start.recordings, motions, strict=True):
                 parallel = parallel_model(problem, motion, start.mean, settings=self)
-                values, summed, lost = _followed(parallel, motion, values)
+                trail, summed, lost = _followed(parallel, motion, values, every=self.time)
+                values = trail[-1]
                 total, count = total + summed, count + motion.t.size
                 if lost:
                     cause, advice = f"{recording.name}: stopped {lost}", "begin closer, lower the bandwidth or raise T"
-                    return solution_of(problem.evidence, Found(values, weights, self.passes, cause, advice))
+                    trusted = _trusted(problem.evidence, (start.mean, *trail[:-1]), weights)
+                    return solution_of(problem.evidence, Found(trusted, weights, self.passes, cause, advice))
             mean = total / count
         return solution_of(problem.evidence, Found(mean, weights, self.passes, cause, advice))
 
@@ -277,19 +280,32 @@ def _with_gains(problem: Problem, bare: ParallelModel, *, gain: FloatArray, time
     return replace(bare, gain=gain, learning=half.T @ half / time)
 
 
-def _followed(parallel: ParallelModel, motion: Stretch, values: FloatArray) -> tuple[FloatArray, FloatArray, str]:
-    """Return the parameters after a motion, their sum over it, and why the model was lost."""
+def _followed(
+    parallel: ParallelModel, motion: Stretch, values: FloatArray, *, every: float
+) -> tuple[list[FloatArray], FloatArray, str]:
+    """Return the parameters every so many seconds and at the end, their sum, and why the model was lost."""
     state = ParallelState(motion.q[:, 0].copy(), motion.dq[:, 0].copy(), values)
     bound = _LOST * max(np.abs(motion.dq).max(), np.finfo(float).tiny)
-    total = np.zeros_like(values)
+    total, trail, kept = np.zeros_like(values), [values], float(motion.t[0])
     for k, t in enumerate(motion.t):
         sample = DrivenSample(float(t), motion.q[:, k], motion.dq[:, k], motion.tau[:, k])
         try:
             after, seen = parallel.stepped(state, sample)
         except np.linalg.LinAlgError:
-            return state.values, total, f"at {t:.2f} s: the model's mass matrix is not positive definite"
+            return [*trail, state.values], total, f"at {t:.2f} s: the model's mass matrix is not positive definite"
         if not np.abs(seen.s).max() < bound:
-            return state.values, total, f"at {t:.2f} s: the model runs away from the robot"
+            return [*trail, state.values], total, f"at {t:.2f} s: the model runs away from the robot"
         state = after
         total += state.values
-    return state.values, total, ""
+        if t - kept >= every:
+            trail, kept = [*trail, state.values], float(t)
+    return [*trail, state.values], total, ""
+
+
+def _trusted(evidence: Evidence, trail: tuple[FloatArray, ...], weights: FloatArray) -> FloatArray:
+    """Return the latest parameters that explain the recordings no worse than the first did.
+
+    A model that runs away has spoilt its parameters long before its speed tells.
+    """
+    errors = [float(np.linalg.norm(weights * joint_residuals(evidence, values))) for values in trail]
+    return next(values for values, error in zip(reversed(trail), reversed(errors), strict=True) if error <= errors[0])

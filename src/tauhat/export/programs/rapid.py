@@ -60,6 +60,7 @@ def write(cell: Cell, legs: Sequence[Leg], head: Sequence[str]) -> Iterator[str]
     yield f"  PROC {settings.name}()"
     yield from (f"    {COMMENT} {line}" for line in head)
     yield r"    ConfL \Off;"
+    yield "    PathAccLim FALSE, FALSE;"
     yield f"    VelSet {decimal(100.0 * settings.approach, RATE)}, {_MOST_TOOL_SPEED};"
     yield "    AccSet 20, 100;"
     yield f"    {_joint_move(cell, legs[0].begin, 'fine')}"
@@ -71,6 +72,10 @@ def write(cell: Cell, legs: Sequence[Leg], head: Sequence[str]) -> Iterator[str]
         yield from (indent + statement for statement in _statements(cell, leg))
     if settings.repeats > 1:
         yield "    ENDFOR"
+    yield "    PathAccLim FALSE, FALSE;"  # these settings stay in force for the next program otherwise
+    yield f"    VelSet 100, {_MOST_TOOL_SPEED};"
+    yield "    AccSet 100, 100;"
+    yield r"    ConfL \On;"
     yield "  ENDPROC"
     yield "ENDMODULE"
 
@@ -202,7 +207,7 @@ def read(cell: Cell, text: str) -> Program:
     zone = rf"(fine|z\d{{1,3}}|\[FALSE{f',{_plain()}' * 6}\])"
     pose = rf"\[{_list(3)}\],\[{_list(4)}\]"
     rules = [
-        rule(r"MODULE [A-Za-z]\w*|PROC [A-Za-z]\w*\(\)|ConfL \\Off;", passed),
+        rule(r"MODULE [A-Za-z]\w*|PROC [A-Za-z]\w*\(\)|ConfL \\(?:On|Off);", passed),
         rule(rf"(VelSet) {NUMBER}, {_MOST_TOOL_SPEED};", reader.put),
         rule(rf"(AccSet) {NUMBER}, 100;", reader.put),
         rule(r"PathAccLim FALSE, FALSE;", reader.unlimit),
