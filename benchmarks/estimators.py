@@ -1,8 +1,11 @@
-"""The least-squares family on known truths: bias, coverage and cost, under the disturbances its members differ by.
+"""Bias, coverage and cost of every estimator, and of the least-squares family under what its members differ by.
 
-    python benchmarks/estimators.py [--json] [--quick] [--seeds 24] [--robot ur5e] [--family-seeds 0] [--workers 2]
+    python benchmarks/estimators.py [--parts conditions plant cost] [--json] [--quick] [--seeds 24] [--robot ur5e]
+                                    [--workers 2]
 
-Every seed is a new motion of 20 s at 200 Hz and a new noise of 5 % of each joint's RMS torque, through a low-pass of
+plant: every estimator on the MuJoCo plant, each seed another robot, motion and noise of 10 s at 500 Hz.
+cost: processor time, closed-loop simulations and peak memory of a fit of 20 s at 500 Hz.
+conditions: the least-squares family. Every seed is a new motion of 20 s at 200 Hz and a new noise of 5 % of each joint's RMS torque, through a low-pass of
 10 Hz. Conditions:
     clean     white noise
     spikes    5 % of the torque samples off by ten times the joint's RMS torque, either sign
@@ -11,7 +14,7 @@ Every seed is a new motion of 20 s at 200 Hz and a new noise of 5 % of each join
     columns   every column and the torque have white errors of 6 % of their norm (made row by row: no recording has that)
 torque: error of the torque that the estimate makes on the motion, over the torque, median over seeds; bias: root mean
 square over the parameters of mean error over its standard error (1 is none); inside: share of the 95 % intervals that
-hold the truth; worst: of a single parameter. --family-seeds N measures how long N seeds of all estimators take.
+hold the truth; worst: of a single parameter.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
+from estimator_parts import costs, on_the_plant, show_costs, show_plant
 from scipy.special import stdtrit
 
 from tauhat.blas import single_threaded
@@ -51,6 +55,7 @@ METHODS = (
     *("ols", "wls", "irls", "irls-huber", "irls-bisquare", "tls"),
     *("ridge", "prior", "ml", "recursive", "hybrid"),
 )
+PARTS = ("conditions", "plant", "cost")
 CONDITIONS = ("clean", "spikes", "touches", "shared", "columns")
 RATE, SECONDS, NOISE = 200.0, 20.0, 0.05
 PROCESSING = Processing(cutoff=10.0, motion_cutoff=30.0)
@@ -189,51 +194,21 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, float]:
     }
 
 
-@single_threaded
-def family(seed: int, *, name: str) -> None:
-    """One seed of all methods, for the time it takes."""
-    run(("clean", seed), name=name, methods=METHODS)
-
-
-def timed_family(name: str, *, seeds: int, workers: int) -> dict[str, float]:
-    """Wall time of many seeds of all methods; kernels are compiled before."""
+def conditions(name: str, chosen: list[str], *, seeds: int, workers: int) -> dict[str, dict[str, dict[str, float]]]:
+    """Figures of every condition and member of the family."""
+    cases = [(condition, seed) for condition in chosen for seed in range(seeds)]
     with ProcessPoolExecutor(workers) as pool:
-        list(pool.map(partial(family, name=name), range(2 * workers)))
-        start = time.perf_counter()
-        list(pool.map(partial(family, name=name), range(seeds), chunksize=10))
-        return {"seeds": seeds, "workers": workers, "seconds": time.perf_counter() - start}
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--quick", action="store_true", help="4 seeds")
-    parser.add_argument("--seeds", type=int, default=24)
-    parser.add_argument("--robot", default="ur5e")
-    parser.add_argument("--conditions", nargs="*", default=list(CONDITIONS), choices=CONDITIONS)
-    parser.add_argument("--family-seeds", type=int, default=0, help="also time so many seeds of all estimators")
-    parser.add_argument("--workers", type=int, default=2)
-    options = parser.parse_args()
-    seeds = 4 if options.quick else options.seeds
-    cases = [(condition, seed) for condition in options.conditions for seed in range(seeds)]
-    with ProcessPoolExecutor(options.workers) as pool:
-        runs = list(pool.map(partial(run, name=options.robot, methods=METHODS), cases))
-    table = {
+        runs = list(pool.map(partial(run, name=name, methods=METHODS), cases))
+    return {
         condition: {
             method: summary([one[method] for case, one in zip(cases, runs, strict=True) if case[0] == condition])
             for method in METHODS
         }
-        for condition in options.conditions
+        for condition in chosen
     }
-    timed = (
-        timed_family(options.robot, seeds=options.family_seeds, workers=options.workers)
-        if options.family_seeds
-        else None
-    )
-    if options.json:
-        print(json.dumps({"robot": options.robot, "seeds": seeds, "table": table, "family": timed}))
-        return
-    print(f"{options.robot}, {truth_of(options.robot).base.n_b} base parameters, {seeds} seeds of {SECONDS:g} s")
+
+
+def show_conditions(table: dict[str, dict[str, dict[str, float]]]) -> None:
     print(
         f"{'condition':10} {'estimator':14} {'torque %':>9} {'bias':>6} {'inside %':>9} {'worst %':>8} {'passes':>7} {'CPU ms':>7}"
     )
@@ -243,8 +218,34 @@ def main() -> None:
                 f"{condition:10} {method:14} {100 * row['torque']:9.3f} {row['bias']:6.2f} {100 * row['inside']:9.1f} "
                 f"{100 * row['worst']:8.0f} {row['passes']:7.0f} {row['milliseconds']:7.1f}"
             )
-    if timed:
-        print(f"{timed['seeds']} seeds of all {len(METHODS)} on {timed['workers']} processes: {timed['seconds']:.0f} s")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--parts", nargs="+", default=list(PARTS), choices=PARTS)
+    parser.add_argument("--json", action="store_true")
+    parser.add_argument("--quick", action="store_true", help="4 seeds; the plant is the two-link arm")
+    parser.add_argument("--seeds", type=int, default=24)
+    parser.add_argument("--robot", default="ur5e")
+    parser.add_argument("--conditions", nargs="*", default=list(CONDITIONS), choices=CONDITIONS)
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    seeds = 4 if options.quick else options.seeds
+    plant = "two_link" if options.quick else options.robot
+    found: dict[str, Any] = {"robot": options.robot, "seeds": seeds}
+    if "conditions" in options.parts:
+        found["conditions"] = conditions(options.robot, options.conditions, seeds=seeds, workers=options.workers)
+    if "plant" in options.parts:
+        found["plant"] = on_the_plant(plant, seeds=seeds, workers=options.workers)
+    if "cost" in options.parts:
+        found["cost"] = costs(plant)
+    if options.json:
+        print(json.dumps(found))
+        return
+    print(f"{options.robot}, {seeds} seeds")
+    for part, show in (("conditions", show_conditions), ("plant", show_plant), ("cost", show_costs)):
+        if part in found:
+            show(found[part])
 
 
 if __name__ == "__main__":

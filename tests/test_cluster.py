@@ -72,7 +72,7 @@ def test_work_that_kills_every_worker_is_given_up(workers):
 
 @pytest.mark.parametrize("way", ["map", "reduce"])
 def test_an_error_of_the_function_is_raised_as_itself(workers, way):
-    with pytest.raises(ValueError, match=r"^no 0$"):
+    with pytest.raises(ValueError, match=r"^no 1$"):
         list(workers.map(refused, range(3))) if way == "map" else workers.reduce(joined, refused, range(3))
 
 

@@ -45,8 +45,11 @@ def joined(left: str, right: str) -> str:
     return f"({left} {right})"
 
 
-def refused(number: int) -> int:
-    raise ValueError(f"no {number}")
+def refused(number: int) -> str:
+    """Refuse one number alone: of several that are refused, the first to be done is the one that is told."""
+    if number == 1:
+        raise ValueError(f"no {number}")
+    return named(number)
 
 
 def noted(path: str) -> None:

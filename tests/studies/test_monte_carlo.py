@@ -180,6 +180,17 @@ def test_a_cell_counts_what_failed_and_what_is_useless():
     assert cell.losses == ("torque of the unseen motion off by more than 20 % (solved)", "it broke", "diverged")
 
 
+def test_bias_is_the_mean_error_over_its_standard_error_of_the_fits_that_ended_well():
+    errors = ((1.0, -0.5), (2.0, 0.5), (3.0, 0.0), (90.0, 90.0))
+    group = [replace(fit("wls", seed, 0.01), errors=values) for seed, values in enumerate(errors[:3])]
+    group.append(replace(fit("wls", 3, 0.5), errors=errors[3]))  # not usable: it does not count
+    (cell,) = cells_of(group, usable=0.2)
+    # Means 2 and 0, standard errors 1 / sqrt(3) and 0.5 / sqrt(3).
+    assert cell.bias == pytest.approx(np.sqrt((2.0**2 * 3.0 + 0.0) / 2.0), rel=1e-12)
+    (few,) = cells_of(group[:2], usable=0.2)
+    assert np.isnan(few.bias)
+
+
 def test_a_standing_is_the_mean_ratio_to_the_reference_on_the_same_logs():
     group = [fit("wls", 0, 0.01), fit("wls", 1, 0.02), fit("x", 0, 0.04), fit("x", 1, 0.02), fit("y", 0, 0.009)]
     reference, twice, once = standings_of(group, noises=(1.0,), usable=0.2)

@@ -9,6 +9,8 @@ import numpy as np
 
 from tauhat.studies.monte_carlo.fitting import Fit
 
+_FEWEST = 3  # fits that tell of a bias
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
@@ -20,6 +22,8 @@ class Cell:
     low, high : quartiles of the torque's error
     passes, seconds : median; seconds of processor time
     inside : mean share of the 95 % intervals that hold the truth
+    bias : root mean square over the parameters of the mean error over its standard error, of the fits that ended well:
+        about 1 without a bias; nan below three such fits
     losses : why the others did not end well, one for each
     """
 
@@ -36,6 +40,7 @@ class Cell:
     passes: float
     seconds: float
     inside: float
+    bias: float = np.nan
     losses: tuple[str, ...] = ()
 
 
@@ -72,6 +77,7 @@ def _cell(fits: Sequence[Fit], usable: float) -> Cell:
         passes=_median([fit.passes for fit in solved]),
         seconds=_median([fit.seconds for fit in solved]),
         inside=float(np.mean([fit.inside for fit in solved])) if solved else np.nan,
+        bias=_bias([fit.errors for fit in solved if not loss_of(fit, usable)]),
         losses=losses,
     )
 
@@ -83,6 +89,15 @@ def loss_of(fit: Fit, usable: float) -> str:
     if fit.torque_error <= usable:
         return ""
     return f"torque of the unseen motion off by more than {100 * usable:g} % ({fit.cause})"
+
+
+def _bias(errors: Sequence[tuple[float, ...]]) -> float:
+    """Return the root mean square of mean over standard error, `errors` being those of the parameters, fit by fit."""
+    if len(errors) < _FEWEST:
+        return float("nan")
+    table = np.array(errors)
+    deviation = np.maximum(table.std(axis=0, ddof=1), np.finfo(float).tiny) / np.sqrt(len(table))
+    return float(np.sqrt(np.mean((table.mean(axis=0) / deviation) ** 2)))
 
 
 def _median(values: Sequence[float]) -> float:

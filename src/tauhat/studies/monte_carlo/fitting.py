@@ -55,6 +55,7 @@ class Fit:
 
     parameter_error : `relative_error` of the base parameters; nan where it failed
     torque_error : norm of the torque's error over the torque, all joints stacked, on the unseen motion
+    errors : of every base parameter, in what it does to the torque of the unseen motion
     inside : share of the 95 % intervals that hold the truth
     passes : how often the problem was solved
     seconds : of processor time that the fit took
@@ -72,6 +73,7 @@ class Fit:
     estimator: str
     parameter_error: float = np.nan
     torque_error: float = np.nan
+    errors: tuple[float, ...] = ()
     inside: float = np.nan
     passes: int = 0
     seconds: float = 0.0
@@ -137,9 +139,11 @@ def _judged(blank: Fit, experiment: Experiment, found: _Solved) -> Fit:
     exact = model_torque(experiment.model, experiment.standard, motion)
     standard = np.zeros(model.n_p)
     standard[base.independent] = values
+    sizes = column_sizes(model, base, motion, exact)
     return replace(
         blank,
-        parameter_error=relative_error(values, truth, column_sizes(model, base, motion, exact)),
+        parameter_error=relative_error(values, truth, sizes),
+        errors=tuple((sizes * (values - truth)).tolist()),
         torque_error=float(np.linalg.norm(model_torque(model, standard, motion) - exact) / np.linalg.norm(exact)),
         inside=float(np.mean(np.abs(values - truth) <= _half_intervals(found.solution))),
         passes=found.solution.passes,

@@ -46,17 +46,18 @@ def every_cell(figures: Figures, robot: str, estimators: Sequence[str]) -> Table
         title=robot,
         header=(
             *("estimator", "noise", "rate [Hz]", "parameters off by [%]", "unseen torque off by [%]"),
-            *("passes", "time [s]", "ended well [%]", "truth inside 95 % intervals [%]", "seeds"),
+            *("passes", "time [s]", "ended well [%]", "truth inside 95 % intervals [%]", "bias", "seeds"),
         ),
         rows=tuple(_row(cell) for cell in cells),
-        note=f"Medians over seeds; shares over all. Time is of one processor core.{seeds}",
+        note="Medians over seeds; shares over all. Time is of one processor core. Bias is the mean error over its "
+        f"standard error, about 1 where there is none.{seeds}",
     )
 
 
 def _row(cell: Cell) -> tuple[TableCell, ...]:
     return (
         cell.estimator, cell.noise, cell.rate, 100.0 * cell.parameter_error, 100.0 * cell.torque_error, cell.passes,
-        cell.seconds, 100.0 * cell.ended, 100.0 * cell.inside, cell.seeds,
+        cell.seconds, 100.0 * cell.ended, 100.0 * cell.inside, cell.bias, cell.seeds,
     )  # fmt: skip
 
 
