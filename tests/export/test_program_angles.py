@@ -9,13 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from tauhat.errors import ExportError
 from tauhat.export.programs.angles import (
-    quaternion,
     rotation_of_quaternion,
-    rotation_of_vector,
     rotation_of_zyx,
-    rotation_vector,
     zyx_angles,
 )
+from tauhat.robots.transforms import quaternion, rotation_of_vector, rotation_vector
 
 RANDOM = Rotation.random(200, random_state=5).as_matrix()
 

@@ -69,6 +69,23 @@ def quaternion(rotation: FloatArray) -> FloatArray:
     return np.asarray(found if found[0] >= 0.0 else -found)
 
 
+def rotation_vector(rotation: FloatArray) -> FloatArray:
+    """Return the axis times the angle, at most pi, of a rotation matrix, (3,) [rad]."""
+    scalar, *vector = quaternion(rotation)
+    size = float(np.linalg.norm(vector))
+    if size == 0.0:
+        return np.zeros(3)
+    return np.asarray(2.0 * np.arctan2(size, scalar) / size * np.array(vector))
+
+
+def rotation_of_vector(vector: FloatArray) -> FloatArray:
+    """Return the (3, 3) rotation about the axis of a vector by its length [rad]."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    return np.asarray(rotation_about(vector / angle, np.array([angle]))[0])
+
+
 def joint_pose(joint: Joint, position: float) -> FloatArray:
     """Return the (4, 4) pose of the joint's link frame in its parent's joint frame at `position` [rad or m]."""
     placement = homogeneous(joint.rotation, joint.translation)

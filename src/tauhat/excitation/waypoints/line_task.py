@@ -9,7 +9,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, frozen
 from tauhat.excitation.point_to_point import Course
-from tauhat.robots.transforms import quaternion, rotation_about
+from tauhat.robots.transforms import rotation_about
 
 
 class TaskMotion(NamedTuple):
@@ -101,12 +101,3 @@ def corner_task(first: Line, second: Line, *, ending: Course, beginning: Course)
         velocity=velocity,
         acceleration=acceleration,
     )
-
-
-def rotation_vector(rotation: FloatArray) -> FloatArray:
-    """Return the axis times the angle, at most pi, of a rotation matrix, (3,) [rad]."""
-    scalar, *vector = quaternion(rotation)
-    size = float(np.linalg.norm(vector))
-    if size == 0.0:
-        return np.zeros(3)
-    return np.asarray(2.0 * np.arctan2(size, scalar) / size * np.array(vector))

@@ -14,12 +14,13 @@ from tauhat.excitation.limits.joint_limits import MotionLimits
 from tauhat.excitation.waypoints.corners import Bend, Neighbours, bend
 from tauhat.excitation.waypoints.curves import JointWay, LineWay, Way
 from tauhat.excitation.waypoints.line_solver import LineSolver, spare_joints
-from tauhat.excitation.waypoints.line_task import Line, rotation_vector
+from tauhat.excitation.waypoints.line_task import Line
 from tauhat.excitation.waypoints.moves import SAME, JointMove, LineMove, Move, ToolLimits
 from tauhat.excitation.waypoints.settings import WaypointSettings
 from tauhat.excitation.waypoints.time_law import RateLimits
 from tauhat.robots.kinematics import Pose, forward_kinematics
 from tauhat.robots.robot import Robot
+from tauhat.robots.transforms import rotation_vector
 
 _TAUGHT = 1e-6  # [rad or m] within which a line reaches the joint positions it was given
 

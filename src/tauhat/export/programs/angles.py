@@ -37,22 +37,6 @@ def rotation_of_zyx(z: float, y: float, x: float) -> FloatArray:
     ])  # fmt: skip
 
 
-def rotation_vector(rotation: FloatArray) -> FloatArray:
-    """Return axis times angle, (3,) [rad], the angle at most pi."""
-    return np.asarray(Rotation.from_matrix(rotation).as_rotvec())
-
-
-def rotation_of_vector(vector: FloatArray) -> FloatArray:
-    """Return the rotation about an axis by an angle, (3, 3)."""
-    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
-
-
-def quaternion(rotation: FloatArray) -> FloatArray:
-    """Return w, x, y, z, (4,), with w not negative."""
-    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
-    return np.array([w, x, y, z]) * (-1.0 if w < 0.0 else 1.0)
-
-
 def rotation_of_quaternion(wxyz: FloatArray) -> FloatArray:
     """Return the rotation of a quaternion w, x, y, z of length 1, (3, 3).
 

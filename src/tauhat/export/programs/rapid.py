@@ -16,7 +16,7 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ExportError
 from tauhat.excitation.waypoints.moves import JointMove, LineMove, Zone
-from tauhat.export.programs.angles import quaternion, rotation_of_quaternion
+from tauhat.export.programs.angles import rotation_of_quaternion
 from tauhat.export.programs.cell import Cell, Leg
 from tauhat.export.programs.digits import (
     DEGREES,
@@ -32,6 +32,7 @@ from tauhat.export.programs.digits import (
 from tauhat.export.programs.program import Program
 from tauhat.export.programs.reading import Gathered, passed, rule, scan
 from tauhat.robots.kinematics import Pose
+from tauhat.robots.transforms import quaternion
 
 COMMENT = "!"
 UNSAID = (

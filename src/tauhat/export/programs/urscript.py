@@ -18,12 +18,12 @@ from tauhat.arrays import FloatArray
 from tauhat.errors import ExportError
 from tauhat.excitation.waypoints.moves import JointMove, LineMove, Zone
 from tauhat.excitation.waypoints.route import joint_rates
-from tauhat.export.programs.angles import rotation_of_vector, rotation_vector
 from tauhat.export.programs.cell import Cell, Leg
 from tauhat.export.programs.digits import METRES, NUMBER, RADIANS, RATE, decimal, decimals, part, values_of
 from tauhat.export.programs.program import Program
 from tauhat.export.programs.reading import Gathered, passed, rule, scan
 from tauhat.robots.kinematics import Pose
+from tauhat.robots.transforms import rotation_of_vector, rotation_vector
 
 COMMENT = "#"
 UNSAID = (

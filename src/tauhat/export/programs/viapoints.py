@@ -13,11 +13,12 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ExportError, TauhatError
 from tauhat.excitation.waypoints.moves import JointMove, LineMove, Move, Zone
-from tauhat.export.programs.angles import quaternion, rotation_of_quaternion
+from tauhat.export.programs.angles import rotation_of_quaternion
 from tauhat.export.programs.cell import Cell, Leg
 from tauhat.export.programs.program import Program
 from tauhat.export.programs.reading import LARGEST_PROGRAM
 from tauhat.robots.kinematics import Pose
+from tauhat.robots.transforms import quaternion
 
 UNSAID = ("Limits of joints and tool, of which speeds and accelerations are parts.",)
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
