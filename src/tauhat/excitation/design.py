@@ -13,7 +13,6 @@ from tauhat.arrays import FloatArray
 from tauhat.blas import single_threaded
 from tauhat.dynamics.model import PLAIN_TERMS, TorqueModel, torque_model
 from tauhat.dynamics.motion import Motion
-from tauhat.dynamics.terms import Coulomb
 from tauhat.errors import ExcitationError
 from tauhat.excitation.criteria import FLOOR, Criterion, Mixed
 from tauhat.excitation.excited import excited_spectrum
@@ -22,13 +21,13 @@ from tauhat.excitation.genetic import GeneticSettings, Progress, evolve
 from tauhat.excitation.gradient import SAMPLES, polish
 from tauhat.excitation.guard import FINER, Guard
 from tauhat.excitation.information import (
-    SMOOTH_SIGN,
     Information,
     Knowledge,
     after_evidence,
     after_motions,
     information,
     with_exact_sign,
+    with_smooth_sign,
 )
 from tauhat.excitation.limits import LimitSet, MotionLimits
 from tauhat.excitation.poses import guard_of, motion_space
@@ -172,7 +171,7 @@ def design(
     limits = wanted.limits or LimitSet(robot=robot)
     limits.check_robot(robot)
     space = motion_space(limits, margin=wanted.margin, period=wanted.period, harmonics=wanted.harmonics)
-    known = wanted.counted(_smooth(torque_model(limits.robot, terms), space.limits))
+    known = wanted.counted(with_smooth_sign(torque_model(limits.robot, terms), space.limits))
     if wanted.after is not None:
         known = after_evidence(known, wanted.after, seconds=wanted.period)
     facts = after_motions(known, [_run_of(series) for series in wanted.earlier])
@@ -225,13 +224,6 @@ class _Search:
     def _value(self, point: FloatArray) -> float:
         grid = self.space.grid(_REPORT_SAMPLES)
         return self.criterion.evaluate(self.facts.matrix(grid.motion(point)))[0]
-
-
-def _smooth(model: TorqueModel, limits: MotionLimits) -> TorqueModel:
-    """Return the model with the sign smoothed for the search, where it has one."""
-    if all(term.key != Coulomb.key for term in model.terms):
-        return model
-    return model.with_term(Coulomb(widths=tuple((SMOOTH_SIGN * limits.velocity).tolist())))
 
 
 def _run_of(series: FourierSeries) -> Motion:

@@ -103,16 +103,35 @@ def evolve(
 
 
 def _algorithm(space: FourierSpace, settings: GeneticSettings, rng: np.random.Generator, guard: Guard | None) -> Any:
+    start = random_points(space, settings.population, rng)
+    if guard is not None:
+        start = np.array([guard.one_start(point, index) for index, point in enumerate(start)])
+    reach = 1.5 * np.abs(start).max(axis=0).ravel() + 1e-12
+    rows = start.reshape(settings.population, -1)
+    return genetic_algorithm(rows, low=-reach, high=reach, generations=settings.generations, rng=rng)
+
+
+def genetic_algorithm(
+    start: FloatArray, *, low: FloatArray | float, high: FloatArray | float, generations: int, rng: np.random.Generator
+) -> Any:
+    """Return pymoo's algorithm, to be asked for populations and told their values.
+
+    Parameters
+    ----------
+    start : (n, n_genes) first population
+    low, high : bounds of the genes, (n_genes,) or one for all
+
+    Raises
+    ------
+    MissingExtraError
+        when pymoo is not installed.
+    """
     try:
         from pymoo.algorithms.soo.nonconvex.ga import GA
         from pymoo.core.problem import Problem
     except ImportError as error:
         raise MissingExtraError("pymoo", "excitation") from error
-    start = random_points(space, settings.population, rng)
-    if guard is not None:
-        start = np.array([guard.one_start(point, index) for index, point in enumerate(start)])
-    reach = 1.5 * np.abs(start).max(axis=0).ravel() + 1e-12
-    problem = Problem(n_var=reach.size, n_obj=1, xl=-reach, xu=reach)
-    algorithm = GA(pop_size=settings.population, sampling=start.reshape(settings.population, -1))
-    algorithm.setup(problem, seed=int(rng.integers(2**31)), termination=("n_gen", settings.generations), verbose=False)
+    problem = Problem(n_var=start.shape[1], n_obj=1, xl=low, xu=high)
+    algorithm = GA(pop_size=len(start), sampling=start)
+    algorithm.setup(problem, seed=int(rng.integers(2**31)), termination=("n_gen", generations), verbose=False)
     return algorithm

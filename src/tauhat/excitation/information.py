@@ -14,10 +14,11 @@ from tauhat.dynamics.motion import Motion, MotionGradient
 from tauhat.dynamics.terms import INERTIAL_SYMBOLS, Coulomb
 from tauhat.errors import ExcitationError
 from tauhat.excitation.criteria import Criterion
+from tauhat.excitation.limits.joint_limits import MotionLimits
 
 _SEED = 20240229
 _STATES = 2000
-SMOOTH_SIGN = 0.02  # width of the smooth sign while a motion is designed, in parts of the speed limit
+_SMOOTH_SIGN = 0.02  # width of the smooth sign while a motion is designed, in parts of the speed limit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -144,6 +145,13 @@ def with_exact_sign(model: TorqueModel) -> TorqueModel:
     if all(term.key != Coulomb.key for term in model.terms):
         return model
     return model.with_term(Coulomb())
+
+
+def with_smooth_sign(model: TorqueModel, limits: MotionLimits) -> TorqueModel:
+    """Return the model with the sign of the speed smoothed for a search, where its Coulomb columns have one."""
+    if all(term.key != Coulomb.key for term in model.terms):
+        return model
+    return model.with_term(Coulomb(widths=tuple((_SMOOTH_SIGN * limits.velocity).tolist())))
 
 
 def after_motions(facts: Information, motions: Iterable[Motion]) -> Information:

@@ -104,14 +104,72 @@ def smallest_singular_value(jacobian: FloatArray) -> float:
     return float(np.linalg.svd(jacobian, compute_uv=False)[-1])
 
 
+class PoseSolver:
+    """Joint positions for poses of one frame, pose by pose; it owns work space and is no data.
+
+    Damped least squares: each step minimises `|J dq - e|^2 + damping |dq|^2`; damping falls while the error does and
+    grows when a step fails. Steps are short, so that the arm keeps the configuration of the seed where it can. Turns by
+    2 pi bring revolute joints back inside their limits.
+
+    frame : name of one of `robot.frames`, or of a joint for that joint's own frame
+    singular : smallest singular value of the Jacobian that is accepted
+
+    Raises
+    ------
+    RobotError
+        no frame of that name.
+
+    Source: Nakamura and Hanafusa, "Inverse kinematic solutions with singularity robustness", 1986.
+    """
+
+    __slots__ = ("_kinematics", "_robot", "_singular", "_where")
+
+    def __init__(self, robot: Robot, frame: str, *, singular: float = LEAST_SINGULAR_VALUE) -> None:
+        self._robot = robot
+        self._kinematics = FrameKinematics(robot, frame)
+        self._singular = singular
+        self._where = f"{robot.name}, frame {frame}"
+
+    def position(self, pose: Pose, seed: FloatArray) -> FloatArray:
+        """Return joint positions that bring the frame to the pose, on the seed's branch, (n_v,) [rad or m].
+
+        Parameters
+        ----------
+        pose : of the frame in the base frame, at one position
+        seed : (n_v,) where the search starts [rad or m]
+
+        Raises
+        ------
+        RobotError
+            when the pose is not reached from the seed, only outside a joint's limits, or only in a singular position.
+        """
+        start = frozen("seed", seed, (self._robot.n_v,), where=self._robot.name)
+        rotation = frozen("rotation", pose.rotation, (3, 3), where="pose")
+        translation = frozen("translation", pose.translation, (3,), where="pose")
+        where = self._where
+        found = _search(self._kinematics, np.array(start), rotation, translation)
+        placement = self._kinematics.at(found)
+        error = placement.distance_to(rotation, translation)
+        if np.abs(error).max() > 10.0 * _REACHED:
+            metres, angle = np.linalg.norm(error[:3]), np.linalg.norm(error[3:])
+            left = f"{1e3 * metres:.4g} mm and {angle:.3g} rad away at the nearest"
+            raise RobotError("the pose is not reached", where=where, got=left, remedy="a nearer pose, or another seed")
+        least = smallest_singular_value(placement.jacobian)
+        if least < self._singular:
+            raise RobotError(
+                "the pose is reached in a singular position only", where=where,
+                expected=f"smallest singular value >= {self._singular:g}", got=f"{least:.2g}",
+                remedy="another pose or seed",
+            )  # fmt: skip
+        return read_only(_inside(self._robot, found, where))
+
+
 def inverse_kinematics(
     robot: Robot, pose: Pose, *, seed: FloatArray, frame: str, singular: float = LEAST_SINGULAR_VALUE
 ) -> FloatArray:
     """Return joint positions that bring the frame to the pose, on the seed's branch, (n_v,) [rad or m].
 
-    Damped least squares: each step minimises `|J dq - e|^2 + damping |dq|^2`; damping falls while the error does and
-    grows when a step fails. Steps are short, so that the arm keeps the configuration of the seed where it can. Turns by
-    2 pi bring revolute joints back inside their limits.
+    As `PoseSolver`, for one pose.
 
     Parameters
     ----------
@@ -122,28 +180,10 @@ def inverse_kinematics(
     Raises
     ------
     RobotError
-        when the pose is not reached from the seed, only outside a joint's limits, or only in a singular position.
-
-    Source: Nakamura and Hanafusa, "Inverse kinematic solutions with singularity robustness", 1986.
+        when there is no such frame, or the pose is not reached from the seed, only outside a joint's limits, or only in
+        a singular position.
     """
-    position = frozen("seed", seed, (robot.n_v,), where=robot.name)
-    rotation = frozen("rotation", pose.rotation, (3, 3), where="pose")
-    translation = frozen("translation", pose.translation, (3,), where="pose")
-    where = f"{robot.name}, frame {frame}"
-    kinematics = FrameKinematics(robot, frame)
-    found = _search(kinematics, np.array(position), rotation, translation)
-    placement = kinematics.at(found)
-    error = placement.distance_to(rotation, translation)
-    if np.abs(error).max() > 10.0 * _REACHED:
-        left = f"{1e3 * np.linalg.norm(error[:3]):.4g} mm and {np.linalg.norm(error[3:]):.3g} rad away at the nearest"
-        raise RobotError("the pose is not reached", where=where, got=left, remedy="a nearer pose, or another seed")
-    least = smallest_singular_value(placement.jacobian)
-    if least < singular:
-        raise RobotError(
-            "the pose is reached in a singular position only", where=where,
-            expected=f"smallest singular value >= {singular:g}", got=f"{least:.2g}", remedy="another pose or seed",
-        )  # fmt: skip
-    return read_only(_inside(robot, found, where))
+    return PoseSolver(robot, frame, singular=singular).position(pose, seed)
 
 
 def _search(kinematics: FrameKinematics, q: FloatArray, rotation: FloatArray, translation: FloatArray) -> FloatArray:

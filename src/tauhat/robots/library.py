@@ -41,6 +41,9 @@ def load_robot(name_or_path: str | Path, *, locked: Mapping[str, float] | None =
     if suffix in {".xml", ".mjcf"}:
         remedy = "give a URDF or a DH table instead"
         raise RobotError("MJCF robots are not supported yet", where=text[:200], remedy=remedy)
+    if suffix == ".json":
+        remedy = "give the robot that it was identified from"
+        raise RobotError("JSON holds an estimate, not a robot", where=text[:200], remedy=remedy)
     if suffix in _URDF_SUFFIXES or _is_file(text):
         return _from_urdf(Path(text), locked)
     remedy = f"{advice_on_name(text, builtin_names())}; or give the path of a .urdf or .toml file"

@@ -50,7 +50,7 @@ def source_from_file(path: str | Path, *, most_bytes: int) -> DescriptionSource:
     try:
         file = Path(path)
         if not file.is_file():
-            remedy = "give a path to a .urdf or .toml file, or the text itself"
+            remedy = "give the path of a .urdf or .toml file"
             raise RobotError("no such robot description", where=where, remedy=remedy)
         with file.open("rb") as stream:
             content = stream.read(most_bytes + 1)

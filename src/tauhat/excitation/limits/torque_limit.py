@@ -9,6 +9,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, IntArray, frozen, read_only
 from tauhat.dynamics.model import Layout, TorqueModel, torque_model
 from tauhat.dynamics.motion import Motion, MotionGradient
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.errors import ExcitationError
 from tauhat.excitation.limits.motion_limit import MotionLimit, Pull
 from tauhat.robots.robot import Robot
@@ -50,7 +51,7 @@ class TorqueLimit(MotionLimit):
         object.__setattr__(self, "joints", read_only(joints))
         object.__setattr__(self, "model", model)
         object.__setattr__(self, "layout", layout)
-        object.__setattr__(self, "values", read_only(_nominal(self.robot)[layout.parameters]))
+        object.__setattr__(self, "values", read_only(nominal_standard_parameters(model)[layout.parameters]))
 
     @property
     def name(self) -> str:
@@ -91,8 +92,3 @@ class TorqueLimit(MotionLimit):
         joint = int(self.joints[row])
         unit = self.robot.joints[joint].effort_unit
         return f"{(1.0 - margin) * self.largest[joint]:.3g} of {self.largest[joint]:.3g} {unit} with friction"
-
-
-def _nominal(robot: Robot) -> FloatArray:
-    rotors = [joint.rotor_inertia for joint in robot.joints]
-    return np.concatenate([robot.inertia.ravel(), rotors, [joint.viscous for joint in robot.joints]])

@@ -90,15 +90,23 @@ class WaypointMotion:
             dq[resting] = ddq[resting] = 0.0
         return MotionSamples(t=t, q=q, dq=dq, ddq=ddq)
 
-    def recording(self, *, rate: float, name: str = "motion") -> Recording:
-        """Return the motion sampled `rate` times a second, from rest to rest, without torque.
+    def recording(self, *, rate: float, name: str = "motion", repeats: int = 1) -> Recording:
+        """Return the motion run `repeats` times, sampled `rate` times a second, from rest to rest, without torque.
 
         `write_recording` makes it the motion file that `tauhat simulate --motion` and `motion_for` read.
+
+        Raises
+        ------
+        ExcitationError
+            when a motion that does not return to its start is to be repeated.
         """
-        count = int(np.ceil(self.duration * rate - SAME)) + 1
+        if repeats < 1 or (repeats > 1 and self.settings.ending != "return"):
+            raise ExcitationError("repeats of a motion that ends elsewhere", expected="1", got=repeats)
+        whole = repeats * self.duration
+        count = int(np.ceil(whole * rate - SAME)) + 1
         t = np.arange(count) / rate
-        samples = self.sample(np.minimum(t, np.nextafter(self.duration, 0.0)))
-        still = (t >= self.duration)[:, None]
+        samples = self.sample(np.minimum(t, np.nextafter(whole, 0.0)))
+        still = (t >= whole)[:, None]
         dq, ddq = (np.where(still, 0.0, part) for part in (samples.dq, samples.ddq))
         return Recording(t=t, q=samples.q, dq=dq, ddq=ddq, joint_names=self.robot.joint_names, name=name)
 
