@@ -59,7 +59,7 @@ def mass_kernel(body, q, out):  # type: ignore[no-untyped-def]
 def sweep_outward(links, inertia, q, dq, work):  # type: ignore[no-untyped-def]
     """Fill `work` with every link's place, motion for ddq = 0, and body (n_v, 10) at the state `q`, `dq` (n_v,)."""
     for i in range(q.size):
-        _placed(links[i], q[i], work, 40 * i)
+        place_link(links[i], q[i], work, 40 * i)
         _outward(links[i], dq[i], work, 40 * i)
         _bodied(i, inertia, work, 40 * i)
 
@@ -83,7 +83,8 @@ def bias_and_mass(links, work, bias, mass):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def _placed(link, q, work, o):  # type: ignore[no-untyped-def]
+def place_link(link, q, work, o):  # type: ignore[no-untyped-def]
+    """Fill `work` from `o` on with the link's rotation (9) and position (3) in its parent's frame."""
     abc, place, axis = link.abc, link.place, link.axis
     p0, p1, p2 = place[0], place[1], place[2]
     if link.prismatic:
