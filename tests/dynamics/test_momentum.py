@@ -45,16 +45,19 @@ def test_trees_of_sliding_and_turning_joints_are_no_exception(seed):
     robot = random_tree(rng, 7)
     model = pinocchio_model(robot)
     data = model.createData()
-    q, dq = rng.uniform(-1.0, 1.0, (2, 5, robot.n_v))
-    p, drift = momentum(robot, np.array(robot.inertia), q, dq)
-    for k in range(5):
-        coriolis = pinocchio.computeCoriolisMatrix(model, data, q[k], dq[k])
-        expected = coriolis.T @ dq[k] - pinocchio.computeGeneralizedGravity(model, data, q[k])
-        assert drift[k] == pytest.approx(expected, rel=1e-10, abs=1e-10)
-        # Momentum is the torque of an acceleration dq without speed and gravity.
-        still = np.zeros(robot.n_v)
-        weight = pinocchio.rnea(model, data, q[k], still, still)
-        assert p[k] == pytest.approx(pinocchio.rnea(model, data, q[k], still, dq[k]) - weight, rel=1e-10, abs=1e-10)
+    inertia, still = np.array(robot.inertia), np.zeros(robot.n_v)
+    q, dq = rng.uniform(-1.0, 1.0, (2, robot.n_v))
+    (p,), (drift,) = momentum(robot, inertia, q[None], dq[None])
+    # Momentum is the torque of an acceleration dq without speed and gravity.
+    weight = pinocchio.rnea(model, data, q, still, still)
+    assert p == pytest.approx(pinocchio.rnea(model, data, q, still, dq) - weight, rel=1e-10, abs=1e-10)
+    # The drift is the slope of the kinetic energy, here in sixth-order differences, less gravity.
+    h = 1e-2
+    around = q + h * (np.arange(7) - 3)[:, None, None] * np.eye(robot.n_v)  # (step, joint, n_v)
+    moving, _ = momentum(robot, inertia, around.reshape(-1, robot.n_v), np.tile(dq, (7 * robot.n_v, 1)))
+    energy = 0.5 * (moving @ dq).reshape(7, robot.n_v)
+    slope = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) @ energy / (60.0 * h)
+    assert drift + weight == pytest.approx(slope, rel=1e-8, abs=1e-8)
 
 
 def test_base_parameters_have_the_momentum_of_the_whole_arm_and_rotors_add_theirs():
