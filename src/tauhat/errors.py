@@ -64,6 +64,10 @@ class SimulationError(TauhatError):
     """A simulated experiment that cannot be run or went unstable."""
 
 
+class SensingError(TauhatError):
+    """A force cannot be sensed: settings, samples or an estimate that do not fit."""
+
+
 class ExportError(TauhatError):
     """A model that cannot be written for another program: no body, no word for it there, another robot's file."""
 

@@ -1,0 +1,177 @@
+"""Observers of external torque: how fast each answers, as the numbers that one kernel reads."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.linalg import expm, solve_discrete_are
+
+from tauhat.arrays import FloatArray
+from tauhat.errors import SensingError
+from tauhat.robots.naming import advice_on_name
+from tauhat.sensing import observer_kernel as kernel
+from tauhat.sensing.sensed_model import SensedModel
+
+N_GAINS = 6
+# Half of a step comes through after ln 2 / K at first order, after 1.678 / K with two eigenvalues at -K, and after
+# 1.43 / w for a Butterworth pair: one gain means one response time, whatever the observer.
+_SECOND_ORDER = 1.678 / np.log(2.0)
+_BUTTERWORTH = 1.43 / np.log(2.0)
+_CRITICAL = 1.5  # k1 of the super-twisting law in parts of the root of k2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observer(ABC):
+    """A smoother of the external torque.
+
+    gain : [1/s] half of a step of torque comes through after `ln 2 / gain`, beside the delay of the filter
+    """
+
+    key: ClassVar[str]
+    kind: ClassVar[int]
+    gain: float = 20.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.gain < np.inf:
+            raise SensingError("gain of an observer", where=self.key, expected="above zero", got=f"{self.gain} 1/s")
+
+    def gains(self, model: SensedModel, step: float) -> FloatArray:
+        """Return what the kernel reads, (n_v, 6), for samples `step` seconds apart."""
+        gains = np.zeros((model.n_v, N_GAINS))
+        own = self._own(model, step)
+        gains[:, : own.shape[-1]] = own
+        return gains
+
+    @abstractmethod
+    def _own(self, model: SensedModel, step: float) -> FloatArray:
+        """Return the observer's numbers, (n,) for all joints or (n_v, n)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InverseDynamicsObserver(Observer):
+    """The model's torque less the measured one, with filtered accelerations, behind a filter of first order."""
+
+    key: ClassVar[str] = "inverse-dynamics"
+    kind: ClassVar[int] = kernel.INVERSE
+
+    def _own(self, model: SensedModel, step: float) -> FloatArray:  # noqa: ARG002
+        return np.array([np.exp(-self.gain * step)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MomentumObserver(Observer):
+    """The generalised momentum observer of first order: no accelerations.
+
+    Source: De Luca, Mattone, "Actuator failure detection and isolation using generalized momenta", 2003.
+    """
+
+    key: ClassVar[str] = "momentum"
+    kind: ClassVar[int] = kernel.FIRST
+
+    def _own(self, model: SensedModel, step: float) -> FloatArray:  # noqa: ARG002
+        return np.array([np.exp(-self.gain * step)])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SecondOrderMomentumObserver(Observer):
+    """The generalised momentum observer of second order: smoother for the same response time."""
+
+    key: ClassVar[str] = "momentum-2"
+    kind: ClassVar[int] = kernel.SECOND
+
+    def _own(self, model: SensedModel, step: float) -> FloatArray:  # noqa: ARG002
+        pole = _SECOND_ORDER * self.gain
+        return np.asarray(expm(step * np.array([[0.0, 1.0], [-(pole**2), -2.0 * pole]])).ravel())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlidingModeObserver(Observer):
+    """Super-twisting on the momentum, discretised implicitly so that it does not chatter, then filtered.
+
+    Source: Garofalo, Mansfeld, Jankowski, Ott, "Sliding mode momentum observers for estimation of external torques and
+    joint acceleration", 2019.
+
+    rate : how fast an external torque may change, in parts of the joint's largest a second [1/s]
+    """
+
+    key: ClassVar[str] = "sliding-mode"
+    kind: ClassVar[int] = kernel.SLIDING
+    rate: float = 20.0
+
+    def _own(self, model: SensedModel, step: float) -> FloatArray:
+        largest = self.rate * model.strength
+        kept = np.full(model.n_v, np.exp(-self.gain * step))
+        return np.stack([_CRITICAL * np.sqrt(largest), largest, kept], axis=1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DisturbanceObserver(Observer):
+    """The nonlinear disturbance observer; its answer follows the mass matrix of the moment.
+
+    `gain` is the rate of a joint that is coupled to no other; directions in which joints move together answer faster,
+    others down to n_v times more slowly.
+
+    Source: Mohammadi, Tavakoli, Marquez, Hashemzadeh, "Nonlinear disturbance observer design for robotic
+    manipulators", 2013.
+    """
+
+    key: ClassVar[str] = "disturbance"
+    kind: ClassVar[int] = kernel.DISTURBANCE
+
+    def _own(self, model: SensedModel, step: float) -> FloatArray:  # noqa: ARG002
+        return np.asarray(self.gain * model.typical_inertia[:, None])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KalmanObserver(Observer):
+    """A Kalman filter on the momentum with a random walk as disturbance, in its steady state.
+
+    The ratio of its noises follows from the response time: both poles of the continuous filter are a Butterworth pair.
+
+    Source: Wahrburg, Boes, Listmann, Dai, Matthias, Ding, "Motor-current-based estimation of Cartesian contact forces
+    and torques for robotic manipulators and its application to force control", 2018.
+    """
+
+    key: ClassVar[str] = "kalman"
+    kind: ClassVar[int] = kernel.KALMAN
+
+    def _own(self, model: SensedModel, step: float) -> FloatArray:  # noqa: ARG002
+        moving = np.array([[1.0, step], [0.0, 1.0]])
+        ratio = (_BUTTERWORTH * self.gain) ** 4 * step
+        noise = ratio * np.array([[step**2 / 3.0, step / 2.0], [step / 2.0, 1.0]]) * step
+        covariance = solve_discrete_are(moving.T, np.array([[1.0], [0.0]]), noise, np.eye(1))
+        kept = covariance[:, 0] / (covariance[0, 0] + 1.0)
+        return np.array([kept[0], kept[1], 1.0])
+
+
+OBSERVERS: Mapping[str, type[Observer]] = {
+    kind.key: kind
+    for kind in (
+        MomentumObserver,
+        SecondOrderMomentumObserver,
+        InverseDynamicsObserver,
+        SlidingModeObserver,
+        DisturbanceObserver,
+        KalmanObserver,
+    )
+}
+"""All observers by name; the first is the default."""
+
+
+def observer_named(name: str, *, gain: float | None = None) -> Observer:
+    """Return the observer of this name, with another gain [1/s] if given.
+
+    Raises
+    ------
+    SensingError
+        when there is none, or the gain is not positive.
+    """
+    if name not in OBSERVERS:
+        raise SensingError(
+            "unknown observer", expected=", ".join(OBSERVERS), got=name[:60], remedy=advice_on_name(name, OBSERVERS)
+        )
+    return OBSERVERS[name]() if gain is None else OBSERVERS[name](gain=gain)

@@ -1,0 +1,101 @@
+"""An estimate as a force observer reads it: links, rotors, friction in two parts, and how wrong it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tauhat.arrays import FloatArray, frozen, read_only
+from tauhat.dynamics.base import random_motion
+from tauhat.dynamics.forward import Masses, rotor_mass_matrix
+from tauhat.dynamics.passive_kernel import DAHL, ELEMENT, LOAD_DAHL
+from tauhat.dynamics.tree import kernel_tree
+from tauhat.errors import ModelError, SensingError
+from tauhat.estimation.estimate import Estimate
+from tauhat.estimation.identified_torque import identified_torque
+from tauhat.robots.robot import Robot
+
+_STRENGTH = 100.0
+_STATES, _SEED = 100, 20240229
+_STANDING = 0.02  # rad/s or m/s, in parts of the top speed, below which a joint counts as standing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SensedModel:
+    """The parts of a model that an observer needs.
+
+    robot : geometry and gravity
+    inertia : (n_v, 10); base parameters do as well
+    rotor : (n_v,) [kg m^2 or kg]
+    sliding : friction, springs and offsets that follow from speed and position, as `dynamics.passive_kernel` has them
+    bristles : friction with a memory of the displacement; its states follow the position as measured
+    rms : (n_v,) of the model's error where the joint moves [Nm or N]
+    slow : (n_v,) speed below which a joint counts as standing [rad/s or m/s]
+    """
+
+    robot: Robot
+    inertia: FloatArray
+    rotor: FloatArray
+    sliding: NDArray[np.void]
+    bristles: NDArray[np.void]
+    rms: FloatArray
+    slow: FloatArray
+
+    def __post_init__(self) -> None:
+        n_v = self.robot.n_v
+        for name, shape in (("inertia", (n_v, 10)), ("rotor", (n_v,)), ("rms", (n_v,)), ("slow", (n_v,))):
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, where="sensed model"))
+        for name in ("sliding", "bristles"):
+            elements = np.array(getattr(self, name))
+            if elements.dtype != ELEMENT:
+                raise ModelError(f"{name} of a sensed model", expected="elements of friction", got=elements.dtype)
+            object.__setattr__(self, name, read_only(elements))
+        if not ((self.rms > 0.0).all() and (self.slow > 0.0).all()):
+            raise SensingError("errors and slow speeds of a model", expected="above zero", got=self.rms.tolist())
+
+    @property
+    def n_v(self) -> int:
+        """Number of joints."""
+        return self.robot.n_v
+
+    @property
+    def strength(self) -> FloatArray:
+        """Largest torque of each joint, (n_v,) [Nm or N]; a hundred times the model's error where none is stated."""
+        stated = self.robot.effort_limit
+        return np.where(np.isfinite(stated) & (stated > 0.0), stated, _STRENGTH * self.rms)
+
+    @property
+    def typical_inertia(self) -> FloatArray:
+        """Mean diagonal of the mass matrix over random positions, rotors included, (n_v,) [kg m^2 or kg]."""
+        q = random_motion(self.robot, _STATES, np.random.default_rng(_SEED)).q.T
+        masses = rotor_mass_matrix(self.robot, q, masses=Masses(self.inertia, self.rotor))
+        return np.asarray(masses.diagonal(axis1=1, axis2=2).mean(axis=0))
+
+    def body(self) -> tuple[NDArray[Any], ...]:
+        """Links, inertia, rotor, sliding elements and bristles, as the kernels read them."""
+        return kernel_tree(self.robot).links, self.inertia, self.rotor, self.sliding, self.bristles
+
+
+def sensed_model(estimate: Estimate) -> SensedModel:
+    """Return an estimate as an observer reads it.
+
+    Raises
+    ------
+    ModelError
+        when a term has no value at a single state: gas springs and motors that turn with two joints.
+    """
+    torque = identified_torque(estimate)
+    remembered = np.isin(torque.elements["kind"], (DAHL, LOAD_DAHL))
+    tops = np.ones(torque.n_v) if estimate.top_speeds is None else estimate.top_speeds
+    return SensedModel(
+        robot=estimate.robot,
+        inertia=torque.inertia,
+        rotor=torque.rotor,
+        sliding=torque.elements[~remembered],
+        bristles=torque.elements[remembered],
+        rms=np.maximum(estimate.joint_rms, np.finfo(float).tiny),
+        slow=_STANDING * np.maximum(tops, np.finfo(float).tiny),
+    )

@@ -1,0 +1,154 @@
+"""External joint torque with its error, sample by sample or along a recording, by any of the observers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from tauhat.arrays import FloatArray, frozen, read_only
+from tauhat.errors import SensingError
+from tauhat.sensing.causal_filter import CausalFilter
+from tauhat.sensing.observer_kernel import ROWS, SCRATCH, observe
+from tauhat.sensing.observers import MomentumObserver, Observer
+from tauhat.sensing.sensed_model import SensedModel
+
+_OUT = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BristleDoubt:
+    """What is not known of friction that remembers its displacement: variances of its states, which are in -1 to 1.
+
+    start : before the joint has moved; 1/3 is that of any state
+    turned : at least, behind a reversal
+    slid : after a long way
+    """
+
+    start: float = 1.0 / 3.0
+    turned: float = 0.04
+    slid: float = 0.0025
+
+    def __post_init__(self) -> None:
+        if not all(0.0 <= value <= 1.0 for value in (self.start, self.turned, self.slid)):
+            raise SensingError("doubt of bristles", expected="variances from 0 to 1", got=(self.start, self.turned))
+
+
+class ObserverMemory(NamedTuple):
+    """What an observer remembers between samples: joint by joint (ROWS, n_v), and states of bristles (2, n)."""
+
+    rows: FloatArray
+    bent: FloatArray
+
+
+class SensedTorque(NamedTuple):
+    """External torque of one sample or of many, (n_v,) or (n_t, n_v).
+
+    tau : what the environment adds [Nm or N]
+    variance : of tau, joint by joint
+    q, dq : filtered position and velocity to which it belongs
+    raw : the mean external torque since the sample before, not smoothed
+    """
+
+    tau: FloatArray
+    variance: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    raw: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TorqueObserver:
+    """A model, an observer and a sample rate: pure steps, and the same along a recording.
+
+    model : what the estimate knows
+    step : time between samples [s]
+    observer : the smoother; the momentum observer at 20 1/s by default
+    cutoff : of the filter that position and torque share [Hz]
+    """
+
+    model: SensedModel
+    step: float
+    observer: Observer = field(default_factory=MomentumObserver)
+    cutoff: float = 10.0
+    doubt: BristleDoubt = field(default_factory=BristleDoubt)
+    _plan: tuple[FloatArray, FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
+    _body: tuple[NDArray[Any], ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        numbers = CausalFilter(cutoff=self.cutoff, step=self.step).numbers
+        gains = read_only(self.observer.gains(self.model, self.step))
+        doubt = self.doubt
+        rest = read_only(np.array([self.observer.kind, self.step, doubt.start, doubt.turned, doubt.slid]))
+        object.__setattr__(self, "_body", self.model.body())
+        object.__setattr__(self, "_plan", (numbers, gains, self.model.rms, rest))
+
+    @property
+    def n_v(self) -> int:
+        """Number of joints."""
+        return self.model.n_v
+
+    def start(self) -> ObserverMemory:
+        """Return the memory before the first sample."""
+        return ObserverMemory(np.full((ROWS, self.n_v), np.nan), np.zeros((2, self.model.bristles.size)))
+
+    def advance(self, memory: ObserverMemory, q: FloatArray, tau: FloatArray) -> tuple[ObserverMemory, SensedTorque]:
+        """Return the memory behind a sample and the external torque, (n_v,).
+
+        Parameters
+        ----------
+        q, tau : (n_v,) position and motor torque, joint side, as measured [rad or m, Nm or N]
+
+        Raises
+        ------
+        SensingError
+            when the observer needs a mass matrix of a body, and the model has none here.
+        """
+        after = ObserverMemory(memory.rows.copy(), memory.bent.copy())
+        sample, out = np.stack([q, tau]), np.empty((_OUT, self.n_v))
+        if not observe(self._body, self._plan, sample, (*after, *_scratch(self.n_v)), out):
+            raise self._no_body()
+        return after, SensedTorque(*out)
+
+    def along(self, q: FloatArray, tau: FloatArray) -> SensedTorque:
+        """Return the external torque along consecutive samples, (n_t, n_v); causal: a row knows none after it.
+
+        Parameters
+        ----------
+        q, tau : (n_t, n_v) `step` seconds apart
+
+        Raises
+        ------
+        SensingError
+            as `advance`.
+        """
+        position = frozen("q", q, (None, self.n_v), where="sensing")
+        torque = frozen("tau", tau, (len(position), self.n_v), where="sensing")
+        out = np.empty((len(position), _OUT, self.n_v))
+        memory = self.start()
+        if not _observe_along(self._body, self._plan, (position, torque), (*memory, *_scratch(self.n_v)), out):
+            raise self._no_body()
+        return SensedTorque(*(np.ascontiguousarray(out[:, index]) for index in range(_OUT)))
+
+    def _no_body(self) -> SensingError:
+        return SensingError(
+            "the mass matrix of the estimate is that of no body", where=f"observer {self.observer.key}",
+            remedy="take another observer, or identify with --physical",
+        )  # fmt: skip
+
+
+def _scratch(n_v: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    return np.empty((SCRATCH, n_v)), np.empty(40 * n_v), np.empty((n_v, n_v))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _observe_along(body, plan, samples, memory, out):  # type: ignore[no-untyped-def]
+    sample = np.empty((2, memory[0].shape[1]))
+    for k in range(out.shape[0]):
+        sample[0], sample[1] = samples[0][k], samples[1][k]
+        if not observe(body, plan, sample, memory, out[k]):
+            return False
+    return True
