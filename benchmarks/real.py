@@ -19,9 +19,13 @@ import subprocess
 import sys
 import tempfile
 import time
-import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+from tauhat.errors import TauhatError
+from tauhat.recordings import LogSource
+from tauhat.studies.real_logs import RealCase, load_cases
 
 EXAMPLES = Path(__file__).parent.parent / "examples" / "real"
 
@@ -29,10 +33,6 @@ EXAMPLES = Path(__file__).parent.parent / "examples" / "real"
 def default_data() -> Path:
     beside = Path(__file__).parent.parent.parent / "shared" / "data"
     return Path(os.environ.get("TAUHAT_REAL_DATA", beside))
-
-
-def read_cases() -> list[dict[str, Any]]:
-    return tomllib.loads((EXAMPLES / "cases.toml").read_text(encoding="utf-8"))["case"]
 
 
 class RefusedError(Exception):
@@ -48,55 +48,53 @@ def tauhat(*arguments: str) -> subprocess.CompletedProcess[str]:
     return done
 
 
-def arguments_of(logs: list[dict[str, str]], data: Path, case: dict[str, Any], map_name: str) -> list[str]:
+def arguments_of(logs: tuple[LogSource, ...], case: RealCase) -> list[str]:
     """Command-line arguments for logs that share a window, a map and a cut-off."""
-    windows = {log.get("rows") for log in logs}
+    windows = {log.rows for log in logs}
     if len(windows) != 1:
-        raise SystemExit(f"{case['name']}: logs of one call share one window")
-    rows = windows.pop()
+        raise SystemExit(f"{case.name}: logs of one call share one window")
+    rows, mapped = windows.pop(), logs[0].map
     return [
-        *(str(data / log["log"]) for log in logs), "--map", str(EXAMPLES / map_name), "--cutoff", str(case["cutoff"]),
-        *(["--rows", rows] if rows else []),
+        *(str(log.path) for log in logs), *(["--map", str(mapped)] if mapped else []), "--cutoff", str(case.cutoff),
+        *(["--rows", f"{rows[0]}:{'' if rows[1] is None else rows[1]}"] if rows else []),
     ]  # fmt: skip
 
 
-def run_case(case: dict[str, Any], data: Path, folder: Path, model: str, estimator: str) -> dict[str, Any]:
+def run_case(case: RealCase, folder: Path, model: str, estimator: str) -> dict[str, Any]:
     """Identify and verify one case with one model and estimator; return its errors."""
-    robot = EXAMPLES / case["robot"] if (EXAMPLES / case["robot"]).exists() else data / case["robot"]
     estimate = folder / "estimate.json"
     start = time.perf_counter()
     fitted = tauhat(
-        "identify", str(robot), *arguments_of(case["fit"], data, case, case["map"]),
+        "identify", case.robot, *arguments_of(case.fit, case),
         "--model", model.removesuffix("+physical"), *(["--physical"] if model.endswith("+physical") else []),
         "--estimator", estimator,
         "-o", str(estimate),
     )  # fmt: skip
     seconds = time.perf_counter() - start
-    judge_map = case.get("judge_map", case["map"])
-    judged = tauhat("verify", str(estimate), *arguments_of(case["judge"], data, case, judge_map), "--json")
+    judged = tauhat("verify", str(estimate), *arguments_of(case.judge, case), "--json")
     logs = json.loads(judged.stdout)["logs"]
     stored = json.loads(estimate.read_text(encoding="utf-8"))
     warnings = [line for line in fitted.stderr.splitlines() if line.startswith("warning")]
     return {
-        "name": case["name"], "errors": [log["relative_rms"] for log in logs], "reference": case["reference"],
+        "name": case.name, "errors": [log["relative_rms"] for log in logs], "reference": case.reference,
         "moving": [log["moving_relative_rms"] for log in logs],
         "joints": [[joint["relative_rms"] for joint in log["joints"]] for log in logs], "seconds": seconds,
         "condition": stored["fit"]["condition"], "processing": stored["processing"], "warnings": warnings,
-        "missing_warnings": [word for word in case.get("expect", ()) if word not in " ".join(warnings)],
-        "aim": case.get("aim"), "model": model, "estimator": estimator, "waits": case.get("waits", ""),
+        "missing_warnings": [word for word in case.expect if word not in " ".join(warnings)],
+        "aim": case.aim, "model": model, "estimator": estimator, "waits": case.waits,
         "structure": stored["structure"],
     }  # fmt: skip
 
 
-def tried(case: dict[str, Any], data: Path, folder: Path, model: str, estimator: str) -> dict[str, Any]:
+def tried(case: RealCase, folder: Path, model: str, estimator: str) -> dict[str, Any]:
     """The same, or why the library refused."""
     try:
-        return run_case(case, data, folder, model, estimator)
+        return run_case(case, folder, model, estimator)
     except RefusedError as error:
-        return {"name": case["name"], "model": model, "estimator": estimator, "refused": str(error)}
+        return {"name": case.name, "model": model, "estimator": estimator, "refused": str(error)}
 
 
-def percent(values: list[float]) -> str:
+def percent(values: Sequence[float]) -> str:
     return " ".join(f"{100 * value:.2f}" for value in values)
 
 
@@ -110,11 +108,15 @@ def main() -> None:
     options = parser.parse_args()
     if not options.data.is_dir():
         raise SystemExit(f"{options.data}: no such folder; name the folder of the recordings with --data")
-    cases = [case for case in read_cases() if options.only in case["name"]]
+    try:
+        cases = load_cases(EXAMPLES / "cases.toml", data=options.data)
+    except TauhatError as error:
+        raise SystemExit(str(error)) from error
+    cases = tuple(case for case in cases if options.only in case.name)
     models = options.models.split(",")
     with tempfile.TemporaryDirectory() as folder:
         results = [
-            tried(case, options.data, Path(folder), model, estimator)
+            tried(case, Path(folder), model, estimator)
             for case in cases
             for model in models
             for estimator in options.estimators.split(",")

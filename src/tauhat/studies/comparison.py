@@ -5,20 +5,26 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from tauhat.dynamics.model import TorqueModel
+from tauhat.dynamics.named_model import AUTO, named_model
 from tauhat.errors import ModelError, TauhatError, TauhatWarning
 from tauhat.estimation.estimate import Estimate
+from tauhat.estimation.estimators import estimator_named
 from tauhat.estimation.identify import identify
 from tauhat.estimation.least_squares import Estimator
 from tauhat.estimation.physical_constraints import PhysicalConstraints
 from tauhat.estimation.selecting import identify_selected
 from tauhat.recordings.recording import Recording
+from tauhat.robots.robot import Robot
 from tauhat.verification.prediction import verify
+
+PHYSICAL = "+physical"
+"""Behind the name of a model: with physical constraints."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,29 +45,69 @@ class Candidate:
     constraints: PhysicalConstraints | None = None
 
 
+def candidate_named(robot: Robot, model: str, estimator: str, *, recordings: Sequence[Recording]) -> Candidate:
+    """Return the candidate that people name: a model as `named_model` takes it, and an estimator.
+
+    Parameters
+    ----------
+    model : with `+physical` behind it, physical constraints hold; `auto` is the choice by cross-validation
+    recordings : that are fitted; what their maps say of motors that turn with two joints belongs to the model
+
+    Raises
+    ------
+    ModelError
+        a model or an estimator that is unknown or does not fit the robot.
+    """
+    name = model.strip()
+    terms = name.removesuffix(PHYSICAL)
+    shared = [motor for recording in recordings for motor in recording.shared_motors]
+    return Candidate(
+        name=name,
+        model=named_model(robot, terms, shared_motors=shared),
+        estimator=estimator_named(estimator),
+        selected=terms == AUTO,
+        constraints=PhysicalConstraints() if name.endswith(PHYSICAL) else None,
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """What became of one candidate.
 
     fit : residual over torque on the fitted recordings
     unseen : of each judged recording, error over torque
+    moving : of each judged recording, the same over the rows in which the robot moves
     joints : of each judged recording, the same joint by joint
     n_parameters, condition : of the model
-    seconds : that identification took
+    passes : how often the problem was solved
+    cause, advice : why the method stopped, and what to do about it
+    seconds, processor_seconds : that identification took
     warnings : what it warned of
     failure : why there is no estimate; empty when there is
+    fitted_to : which recordings it was identified from, where there are several sets of them
     """
 
     model: str
     estimator: str
     fit: float = np.inf
     unseen: tuple[float, ...] = ()
+    moving: tuple[float, ...] = ()
     joints: tuple[tuple[float, ...], ...] = ()
     n_parameters: int = 0
     condition: float = np.inf
+    passes: int = 0
+    cause: str = ""
+    advice: str = ""
     seconds: float = 0.0
+    processor_seconds: float = 0.0
     warnings: tuple[str, ...] = ()
     failure: str = ""
+    fitted_to: str = ""
+
+    @property
+    def name(self) -> str:
+        """How reports call it: model, estimator, and what it was fitted to."""
+        return ", ".join(part for part in (self.model, self.estimator, self.fitted_to) if part)
 
     @property
     def mean_unseen(self) -> float:
@@ -73,6 +119,7 @@ class Outcome:
         return {
             "model": self.model,
             "estimator": self.estimator,
+            "fitted_to": self.fitted_to,
             "fit": self.fit if np.isfinite(self.fit) else None,
             "unseen": list(self.unseen),
             "joints": [list(joints) for joints in self.joints],
@@ -108,7 +155,9 @@ class Comparison:
             "fitted": list(self.fitted),
             "judged": list(self.judged),
             "outcomes": [outcome.to_dict() for outcome in self.outcomes],
-            "best": None if best is None else {"model": best.model, "estimator": best.estimator},
+            "best": None
+            if best is None
+            else {"model": best.model, "estimator": best.estimator, "fitted_to": best.fitted_to},
         }
 
 
@@ -135,19 +184,49 @@ def compare(
     ModelError
         when there is no candidate or no recording to judge on.
     """
-    if not candidates or not judged:
+    return compare_sets([FittedSet(recordings=fitted, candidates=candidates)], judged, cutoff=cutoff, tell=tell)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedSet:
+    """Recordings, and who is fitted to them.
+
+    name : what outcomes call the recordings; empty where there are no others
+    """
+
+    name: str = ""
+    recordings: Sequence[Recording]
+    candidates: Sequence[Candidate]
+
+
+def compare_sets(
+    sets: Sequence[FittedSet],
+    judged: Sequence[Recording],
+    *,
+    cutoff: float | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> Comparison:
+    """Return `compare` for several sets of recordings that are fitted, all with the low-pass of the first.
+
+    Raises
+    ------
+    ModelError
+        when there is no candidate or no recording to judge on.
+    """
+    pairs = [(one, candidate) for one in sets for candidate in one.candidates]
+    if not pairs or not judged:
         raise ModelError("a comparison needs a model, an estimator and a recording that is not fitted")
     outcomes: list[Outcome] = []
     shared = cutoff
-    for candidate in candidates:
-        tell(f"{candidate.name}, {candidate.estimator.key}")
-        outcome, used = _outcome(candidate, fitted, judged, shared)
+    for one, candidate in pairs:
+        tell(", ".join(part for part in (candidate.name, candidate.estimator.key, one.name) if part))
+        outcome, used = _outcome(candidate, one.recordings, judged, shared)
         shared = shared or used
-        outcomes.append(outcome)
+        outcomes.append(replace(outcome, fitted_to=one.name))
     return Comparison(
-        fitted=tuple(recording.name for recording in fitted),
+        fitted=tuple(dict.fromkeys(recording.name for one in sets for recording in one.recordings)),
         judged=tuple(recording.name for recording in judged),
-        joint_names=candidates[0].model.robot.joint_names,
+        joint_names=pairs[0][1].model.robot.joint_names,
         outcomes=tuple(outcomes),
     )
 
@@ -156,12 +235,12 @@ def _outcome(
     candidate: Candidate, fitted: Sequence[Recording], judged: Sequence[Recording], cutoff: float | None
 ) -> tuple[Outcome, float | None]:
     """Return the outcome and the cut-off that was used."""
-    started = time.perf_counter()
+    started, worked = time.perf_counter(), time.process_time()
     try:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", TauhatWarning)
             estimate = _identified(candidate, fitted, cutoff)
-        seconds = time.perf_counter() - started
+        seconds, processor_seconds = time.perf_counter() - started, time.process_time() - worked
         logs = verify(estimate, judged).logs
     except TauhatError as error:
         return Outcome(model=candidate.name, estimator=candidate.estimator.key, failure=str(error)), cutoff
@@ -170,10 +249,15 @@ def _outcome(
         estimator=candidate.estimator.key,
         fit=estimate.relative_rms,
         unseen=tuple(log.relative_rms for log in logs),
+        moving=tuple(log.moving_relative_rms for log in logs),
         joints=tuple(tuple(joint.relative_rms for joint in log.joints) for log in logs),
         n_parameters=estimate.n_fitted,
         condition=estimate.condition,
+        passes=estimate.passes,
+        cause=estimate.cause,
+        advice=estimate.advice,
         seconds=seconds,
+        processor_seconds=processor_seconds,
         warnings=tuple(str(w.message) for w in caught if issubclass(w.category, TauhatWarning)),
     )
     return outcome, estimate.processing.cutoff

@@ -7,9 +7,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal, TypeAlias
 
-import numpy as np
-
 from tauhat.errors import ModelError
+from tauhat.plain_data import without_infinities
 from tauhat.workers import Workers
 
 Cell: TypeAlias = str | float | int
@@ -108,30 +107,23 @@ class StudyResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; numbers that are not finite become None."""
-        plain: dict[str, Any] = _finite(asdict(self))
+        plain: dict[str, Any] = without_infinities(asdict(self))
         return plain
 
 
 class Study(ABC):
     """Settings of a study that one command runs.
 
-    Subclasses are frozen settings objects; `key` names them on the command line, `title` heads their page.
+    Subclasses are frozen settings objects; `key` names them on the command line, `title` heads their page. `takes` are
+    the settings that the command line may give, `needs` those of them without which there is no study.
     """
 
     __slots__ = ()
     key: ClassVar[str]
     title: ClassVar[str]
+    takes: ClassVar[tuple[str, ...]] = ("seeds",)
+    needs: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def run(self, workers: Workers, *, tell: Callable[[str], None] = lambda _: None) -> StudyResult:
         """Return what the study finds, its independent parts done by the workers; `tell` hears how far it is."""
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(part) for part in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
