@@ -16,7 +16,7 @@ Arguments in tuples:
     arm    links of `KernelTree`, inertia (n_v, 10), rotor (n_v,), elements of `passive_kernel`
     task   law: kp, kd, ki, limit (n_v,); reference: q, dq, ff (n_t, n_v), on cubics between the samples; times: the
            step between samples, the steps of the integrator in it, and for how many of these the controller holds a
-           torque, as sampled controllers do (0: it acts all the time)
+           torque, as sampled controllers do (0: it acts all the time), and how many of its periods a torque is late
 `start` is q, dq (2, n_v). Filled: `out` (4, n_v, n_t) with q, dq, ddq, tau at every sample. Returned: (code, sample, joint).
 The integral stops while the torque is at its limit and the error would drive it further.
 
@@ -32,6 +32,7 @@ from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved, sw
 from tauhat.dynamics.passive_kernel import DAHL, LOAD_DAHL, bent_by, passive_kernel
 
 FINE, NO_BODY, RAN_AWAY = 0, 1, 2
+_LATE = 16  # row of memory from which on torques stand that have been asked for and not come through yet
 RUNAWAY = 1e3  # [rad/s or m/s] no robot moves this fast
 
 
@@ -40,7 +41,7 @@ def leapfrog_kernel(arm, task, start, out):  # type: ignore[no-untyped-def]
     """Simulate by leapfrog steps; see the head of this file."""
     elements, times = arm[3], task[2]
     _, n_v, n_t = out.shape
-    rows, bent = np.zeros((16, n_v)), np.zeros(elements.size)
+    rows, bent = np.zeros((_LATE + times[3], n_v)), np.zeros(elements.size)
     rows[0], rows[1] = start[0], start[1]
     memory = (rows, bent, np.empty(40 * n_v), np.empty((2, n_v, n_v)))
     code, joint = _leap(-1, 0, arm, task, memory)
@@ -65,7 +66,7 @@ def _leap(turn, s, arm, task, memory):  # type: ignore[no-untyped-def]
     """Find the change of speed of one step; return (code, joint).
 
     `memory` are rows, bent, work, and two mass matrices. `rows` are 16 quantities, (n_v,) each: q, u, v, a, d, tau,
-    keep, load, free, integral, held torque, moved, bias, taken, damping, stiffness.
+    keep, load, free, integral, held torque, moved, bias, taken, damping, stiffness; then torques that are still late.
     """
     law, _, times = task
     rows, bent, _, masses = memory
@@ -99,7 +100,7 @@ def _leap(turn, s, arm, task, memory):  # type: ignore[no-untyped-def]
 def _steer(turn, s, task, rows):  # type: ignore[no-untyped-def]
     """Fill the law's torque at the predicted state, and which joints may take kp and kd implicitly."""
     q, v, tau, free, integral, held = rows[0], rows[2], rows[5], rows[8], rows[9], rows[10]
-    (kp, kd, ki, limit), (q_ref, dq_ref, ff), (step, substeps, hold) = task
+    (kp, kd, ki, limit), (q_ref, dq_ref, ff), (step, substeps, hold, delay) = task
     k, h, part = max(turn, 0), step / substeps, s / substeps
     if hold > 0 and (k * substeps + s) % hold != 0:
         tau[:] = held
@@ -111,6 +112,8 @@ def _steer(turn, s, task, rows):  # type: ignore[no-untyped-def]
         asked, free[j] = _driven(ahead + kp[j] * e + kd[j] * de + ki[j] * summed, limit[j])
         if turn >= 0 and (free[j] > 0.0 or asked * e < 0.0):
             integral[j] += h * max(hold, 1) * e
+        if delay > 0:
+            asked = _came_through(asked, rows[_LATE:, j], turn < 0)
         tau[j] = asked if hold == 0 or k + s == 0 else 0.5 * (held[j] + asked)
         free[j] = free[j] if hold == 0 else 0.0
         held[j] = asked
@@ -165,7 +168,7 @@ def runge_kutta_kernel(arm, task, start, out):  # type: ignore[no-untyped-def]
     elements, times = arm[3], task[2]
     _, n_v, n_t = out.shape
     h = times[0] / times[1]
-    state, rows = np.zeros((3, n_v)), np.zeros((10, n_v))  # state: q, dq, integral
+    state, rows = np.zeros((3, n_v)), np.zeros((_LATE + times[3], n_v))  # state: q, dq, integral
     state[0], state[1] = start[0], start[1]
     rates = np.zeros((5, 3, n_v))  # of the four stages, behind a row of zeros
     bent = np.zeros(elements.size)
@@ -222,6 +225,8 @@ def _rate(moment, arm, task, stage, scratch, rate):  # type: ignore[no-untyped-d
     if hold == 0 or (ahead == 0.0 and (k * substeps + s) % hold == 0):
         _law_torque(task, k, (s + ahead) / substeps, state, tau, rate)
         rows[8] = rate[2]
+        for j in range(tau.size if times[3] > 0 else 0):
+            tau[j] = _came_through(tau[j], rows[_LATE:, j], k + s == 0)
     if s == 0 and ahead == 0.0:
         rows[7] = tau
     for j in range(tau.size):
@@ -260,6 +265,18 @@ def _between(signal, k, j, part):  # type: ignore[no-untyped-def]
         a = 3.0 * (b - c) + d
     cubic = 3.0 * (b - c) + d - a
     return b + 0.5 * part * (c - a + part * (2.0 * a - 5.0 * b + 4.0 * c - d + part * cubic))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _came_through(asked, queue, beginning):  # type: ignore[no-untyped-def]
+    """Return the torque that comes through as another is asked for; at the beginning none other is on its way."""
+    if beginning:
+        queue[:] = asked
+    first = queue[0]
+    for place in range(queue.size - 1):
+        queue[place] = queue[place + 1]
+    queue[-1] = asked
+    return first
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})

@@ -81,12 +81,14 @@ class Stepping(NamedTuple):
     substeps : of the integrator in it
     hold : of these, for which the controller holds its torque; 0: it acts all the time
     integrator : the method
+    delay : periods of the controller from a position to the torque that answers it, where torques are held
     """
 
     step: float
     substeps: int = 1
     hold: int = 0
     integrator: Integrator = "leapfrog"
+    delay: int = 0
 
 
 class Moved(NamedTuple):
@@ -210,7 +212,8 @@ def follow(
     n_t, n_v = reference.q.shape
     out = np.empty((4, n_v, n_t))
     body = (kernel_tree(arm.model.robot).links, *arm.masses(standard), arm.passive(standard))
-    task = (tuple(gains), tuple(reference), stepping[:3])
+    times = (stepping.step, stepping.substeps, stepping.hold, stepping.delay if stepping.hold else 0)
+    task = (tuple(gains), tuple(reference), times)
     kernel: Callable[..., tuple[int, int, int]] = _KERNELS[stepping.integrator]
     code, sample, joint = kernel(body, task, start, out)
     where = f"t = {sample * stepping.step:.4g} s"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -84,6 +84,14 @@ class SampledReference:
         return SampledReference(t=t, q=q, dq=dq, ddq=ddq)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopFile:
+    """The file that a loop was read from: its name, and the hash of its bytes."""
+
+    name: str
+    sha256: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClosedLoop:
     """How the recorded robot was driven, as far as it is known.
@@ -96,8 +104,10 @@ class ClosedLoop:
     references : one a recording, in its time; empty: the measured position, low-passed at `reference_cutoff`
     reference_cutoff : [Hz]; that of the processing where it is lower
     control_rate : at which the controller computes a torque and holds it [Hz]; None: all the time
+    delay : from a position to the torque that answers it, whole periods of the controller; none without control_rate
     longest_step : of the integrator [s]; a step between two samples, or two torques, is cut into equal ones below it
     integrator : "leapfrog", or "runge-kutta" for smooth friction
+    file : that it was read from
     """
 
     law: TrackingLaw | None = None
@@ -105,8 +115,10 @@ class ClosedLoop:
     references: Sequence[Reference] = ()
     reference_cutoff: float = 10.0
     control_rate: float | None = None
+    delay: int = 0
     longest_step: float = 1e-3
     integrator: Integrator = "leapfrog"
+    file: LoopFile | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "references", tuple(self.references))
@@ -114,6 +126,8 @@ class ClosedLoop:
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
                 raise ModelError(f"closed loop: {name} must be positive", got=value)
+        if self.delay < 0:
+            raise ModelError("closed loop: delay is negative", got=self.delay)
         if self.integrator not in {"leapfrog", "runge-kutta"}:
             raise ModelError("closed loop: unknown integrator", expected="leapfrog or runge-kutta", got=self.integrator)
 
@@ -129,9 +143,9 @@ class ClosedLoop:
         torques = step * self.control_rate  # of the controller in a sample
         if torques >= 1.0:
             hold = _cut(step / round(torques), self.longest_step)
-            return Stepping(step, round(torques) * hold, hold, self.integrator)
+            return Stepping(step, round(torques) * hold, hold, self.integrator, self.delay)
         substeps = _cut(step, self.longest_step)
-        return Stepping(step, substeps, round(substeps / torques), self.integrator)
+        return Stepping(step, substeps, round(substeps / torques), self.integrator, self.delay)
 
     def law_for(self, robot: Robot, masses: Masses, q: FloatArray) -> TrackingLaw:
         """Return the law, tuned to these masses along the motion q (n_t, n_v) where none is given.
@@ -158,13 +172,16 @@ class ClosedLoop:
         law: dict[str, Any] | None = None
         if self.law is not None:
             gains = {"kp": self.law.kp.tolist(), "kd": self.law.kd.tolist(), "ki": self.law.integral_gain.tolist()}
-            law = {"law": self.law.key, **gains}
+            limits = [limit if np.isfinite(limit) else None for limit in self.law.torque_limit.tolist()]
+            law = {"law": self.law.key, **gains, "torque_limit": limits}
         return {
+            "file": None if self.file is None else asdict(self.file),
             "law": law,
             "bandwidth": None if law else self.bandwidth,
             "references": [type(reference).__name__ for reference in self.references] or "measured",
             "reference_cutoff": self.reference_cutoff,
             "control_rate": self.control_rate,
+            "delay": self.delay,
             "longest_step": self.longest_step,
             "integrator": self.integrator,
         }

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 from tauhat.errors import ModelError
+from tauhat.estimation.closed_loop import ClosedLoop
 from tauhat.estimation.didim import DirectInverse
 from tauhat.estimation.filters import (
     Adaline,
@@ -25,6 +29,7 @@ from tauhat.estimation.prior import PriorLeastSquares, RidgeLeastSquares
 from tauhat.estimation.recursive import RecursiveLeastSquares
 from tauhat.estimation.robust import BisquareLeastSquares, CauchyLeastSquares, HuberLeastSquares
 from tauhat.estimation.sequential import SequentialLeastSquares
+from tauhat.estimation.simulating import SimulationEstimator
 from tauhat.estimation.total_least_squares import TotalLeastSquares
 
 _METHODS: tuple[type[Estimator], ...] = (
@@ -59,14 +64,44 @@ ESTIMATORS: dict[str, type[Estimator]] = {method.key: method for method in _METH
 """Every estimator by its name."""
 
 
-def estimator_named(key: str) -> Estimator:
+SIMULATING: tuple[str, ...] = tuple(
+    key for key, method in ESTIMATORS.items() if issubclass(method, SimulationEstimator)
+)
+"""Names of those that simulate the recorded robot, and its controller with it."""
+
+
+def estimator_named(key: str, *, loop: ClosedLoop | None = None) -> Estimator:
     """Return the estimator of this name in its default settings.
+
+    Parameters
+    ----------
+    loop : how the recorded robot was driven, for an estimator that simulates it
 
     Raises
     ------
     ModelError
-        when there is none.
+        when there is none, or it does not simulate and gets a loop.
     """
     if key not in ESTIMATORS:
         raise ModelError("unknown estimator", expected=", ".join(ESTIMATORS), got=key)
-    return ESTIMATORS[key]()
+    method = ESTIMATORS[key]()
+    if loop is None:
+        return method
+    check_simulating([key])
+    return replace(method, loop=loop) if isinstance(method, SimulationEstimator) else method
+
+
+def check_simulating(keys: Iterable[str]) -> None:
+    """Check that one of these estimators at least simulates, and so has a use for a controller.
+
+    Raises
+    ------
+    ModelError
+        when none does.
+    """
+    given = list(keys)
+    if not set(given) & set(SIMULATING):
+        raise ModelError(
+            "a controller is for estimators that simulate the robot", expected=", ".join(SIMULATING),
+            got=", ".join(given),
+        )  # fmt: skip

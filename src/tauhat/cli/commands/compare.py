@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tauhat.cli.options import (
+    ControllerOption,
     CutoffOption,
     JsonOption,
     LockOption,
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from tauhat.robots.robot import Robot
     from tauhat.studies import Candidate, Comparison
 
-_PHYSICAL = "+physical"
+_ESTIMATORS = ["wls"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,6 +50,16 @@ class Options:
             readable=False,
         ),
     ]
+    task: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--task",
+            metavar="LOG",
+            help="Recording near the work: models are fitted to the LOGs, to these, and to both; may be repeated.",
+            show_default=False,
+            readable=False,
+        ),
+    ] = None
     models: Annotated[
         list[str] | None,
         typer.Option(
@@ -62,6 +73,7 @@ class Options:
         list[str] | None,
         typer.Option("--estimator", metavar="NAME", help="May be repeated.", show_default="wls"),
     ] = None
+    controller: ControllerOption = None
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="PAGE.html", help="Page with table and figure.", show_default=False),
@@ -92,16 +104,25 @@ class Options:
 def run(options: Options) -> None:
     """Identify with several models and estimators, and compare them on recordings that none was fitted to."""
     from tauhat.cli.inputs import read_recordings, robot_of_recordings
-    from tauhat.studies import compare
+    from tauhat.estimation.estimators import check_simulating
+    from tauhat.studies import compare_sets
 
+    if options.controller is not None:
+        check_simulating(options.estimators or _ESTIMATORS)
     with working("reading"):
-        fitted = read_recordings(options.logs, map_file=options.map_file, rows=options.rows)
+        logs, task = (
+            read_recordings(paths, map_file=options.map_file, rows=options.rows)
+            for paths in (options.logs, options.task or [])
+        )
         unseen_map = options.unseen_map or options.map_file
         judged = read_recordings(options.unseen, map_file=unseen_map, rows=options.unseen_rows)
-        robot = robot_of_recordings(options.robot, (*fitted, *judged), locked=options.lock)
-    candidates = _candidates(robot, fitted, options)
+        robot = robot_of_recordings(options.robot, (*logs, *task, *judged), locked=options.lock)
+    candidates = _candidates(robot, (*logs, *task), options)
+    sets = {"global": logs, "task": task, "both": (*logs, *task)} if task else {"": logs}
     with working("comparing"):
-        result = compare(candidates, fitted, judged, cutoff=options.cutoff, tell=lambda name: say("identifying", name))
+        result = compare_sets(
+            candidates, sets, judged, cutoff=options.cutoff, tell=lambda name: say("identifying", name)
+        )
     document = result.to_dict()
     if options.output is not None:
         from tauhat.report.page import write_comparison
@@ -113,22 +134,30 @@ def run(options: Options) -> None:
 
 def _candidates(robot: Robot, fitted: tuple[Recording, ...], options: Options) -> list[Candidate]:
     """Return every model with every estimator, models in the outer loop."""
-    from tauhat.cli.models import AUTO, model_of
-    from tauhat.estimation.estimators import estimator_named
-    from tauhat.estimation.physical_constraints import PhysicalConstraints
-    from tauhat.studies import Candidate
+    from tauhat.studies.comparison import candidate_named
 
-    named = [estimator_named(name) for name in options.estimators or ["wls"]]
+    candidates = [
+        candidate_named(robot, model, estimator, recordings=fitted)
+        for model in options.models or ["plain", "robust"]
+        for estimator in options.estimators or _ESTIMATORS
+    ]
+    return candidates if options.controller is None else _driven(candidates, robot, options)
+
+
+def _driven(candidates: list[Candidate], robot: Robot, options: Options) -> list[Candidate]:
+    """Return the candidates, the simulating ones with the controller of the fitted logs."""
+    from tauhat.cli.inputs import loop_of, sources_of
+    from tauhat.estimation.estimators import SIMULATING, estimator_named
+
+    sources = sources_of(
+        [*options.logs, *(options.task or [])], map_file=options.map_file, rows=options.rows, period=None
+    )
+    loop = loop_of(options.controller, robot, sources)
     return [
-        Candidate(
-            name=text.strip(),
-            model=model_of(robot, text.strip().removesuffix(_PHYSICAL), fitted),
-            estimator=estimator,
-            selected=text.strip().removesuffix(_PHYSICAL) == AUTO,
-            constraints=PhysicalConstraints() if text.strip().endswith(_PHYSICAL) else None,
-        )
-        for text in options.models or ["plain", "robust"]
-        for estimator in named
+        replace(candidate, estimator=estimator_named(candidate.estimator.key, loop=loop))
+        if candidate.estimator.key in SIMULATING
+        else candidate
+        for candidate in candidates
     ]
 
 
@@ -139,23 +168,23 @@ def _view(result: Comparison, options: Options) -> Iterator[RenderableType]:
 
     made = table(
         "Error over torque, by model and estimator",
-        ("model", "estimator"),
+        ("model", "estimator", *(("fitted to",) if options.task else ())),
         ("fit", *(f"unseen {index + 1}" for index in range(len(result.judged))), "parameters", "s"),
     )
     for outcome in result.outcomes:
         unseen = [graded(error) for error in outcome.unseen] or ["failed"] * len(result.judged)
         fit = "" if outcome.failure else graded(outcome.fit)
-        made.add_row(
-            escape(outcome.model), outcome.estimator, fit, *unseen, str(outcome.n_parameters), f"{outcome.seconds:.1f}"
-        )
+        names = [escape(outcome.model), outcome.estimator, *([outcome.fitted_to] if options.task else [])]
+        made.add_row(*names, fit, *unseen, str(outcome.n_parameters), f"{outcome.seconds:.1f}")
     yield made
     for index, name in enumerate(result.judged):
         yield unbroken(f"unseen {index + 1}: {name}")
     for outcome in result.outcomes:
         if outcome.failure:
-            yield unbroken(f"{outcome.model}, {outcome.estimator}: {outcome.failure}")
+            yield unbroken(f"{outcome.name}: {outcome.failure}")
     best = result.best
     if best is not None:
-        yield unbroken(f"Least error on unseen recordings: {best.model} with {best.estimator}.")
+        where = f", fitted to {best.fitted_to}" if options.task else ""
+        yield unbroken(f"Least error on unseen recordings: {best.model} with {best.estimator}{where}.")
     if options.output is not None:
         yield unbroken(f"Written: {options.output}")

@@ -10,6 +10,7 @@ import typer
 
 from tauhat.cli.options import (
     ClusterOption,
+    ControllerOption,
     CutoffOption,
     FittedModelOption,
     JsonOption,
@@ -29,9 +30,11 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from tauhat.dynamics.model import TorqueModel
+    from tauhat.estimation.closed_loop import ClosedLoop
     from tauhat.estimation.estimate import Estimate
     from tauhat.estimation.least_squares import Estimator
     from tauhat.estimation.physical_constraints import PhysicalConstraints
+    from tauhat.recordings.log_source import LogSource
     from tauhat.recordings.recording import Recording
 
 _SHOWN = ("tauhat_version", "fingerprint", "parameters", "fit", "structure", "physical", "processing", "inputs")
@@ -51,6 +54,7 @@ class Options:
     estimator: Annotated[
         str, typer.Option("--estimator", metavar="NAME", help="Method of the fit; an unknown name lists all.")
     ] = "wls"
+    controller: ControllerOption = None
     physical: Annotated[
         bool,
         typer.Option("--physical", help="Keep every link a possible body, friction positive; gives all parameters."),
@@ -87,13 +91,14 @@ class Options:
 
 def run(options: Options) -> None:
     """Identify a robot's torque model from recordings and write it as an estimate file."""
-    from tauhat.estimation.estimators import estimator_named
+    from tauhat.estimation.estimators import check_simulating, estimator_named
     from tauhat.files import check_output
 
     estimator_named(options.estimator)
-    check_output(
-        options.output, inputs=[options.robot, *options.logs, *([options.map_file] if options.map_file else [])]
-    )
+    if options.controller is not None:
+        check_simulating([options.estimator])
+    given = [file for file in (options.map_file, options.controller) if file is not None]
+    check_output(options.output, inputs=[options.robot, *options.logs, *given])
     away = options.cluster is not None or options.workers is not None
     estimate = _identified_by_workers(options) if away else _identified_here(options)
     estimate.save(options.output)
@@ -102,7 +107,7 @@ def run(options: Options) -> None:
 
 def _identified_here(options: Options) -> Estimate:
     """Return the estimate of logs that are read into memory."""
-    from tauhat.cli.inputs import averaged, read_recordings, robot_of_recordings
+    from tauhat.cli.inputs import averaged, loop_of, read_recordings, robot_of_recordings
     from tauhat.cli.models import model_of
 
     with working("reading"):
@@ -110,13 +115,14 @@ def _identified_here(options: Options) -> Estimate:
         recordings = averaged(measured, period=options.period)
         robot = robot_of_recordings(options.robot, recordings, locked=options.lock)
         model = model_of(robot, options.model, recordings)
+        estimator = _estimator(options, loop_of(options.controller, robot, _sources(options)))
     with working("identifying"):
-        return _identified(model, recordings, options)
+        return _identified(model, recordings, estimator, options)
 
 
 def _identified_by_workers(options: Options) -> Estimate:
     """Return the estimate of logs that workers read."""
-    from tauhat.cli.inputs import robot_of_recordings, sources_of
+    from tauhat.cli.inputs import robot_of_recordings
     from tauhat.cli.models import AUTO, model_of
     from tauhat.cluster import workers_of
     from tauhat.errors import ModelError
@@ -131,8 +137,7 @@ def _identified_by_workers(options: Options) -> Estimate:
         )
     workers = workers_of(options.cluster, options.workers)
     with working("reading"):
-        sources = sources_of(options.logs, map_file=options.map_file, rows=options.rows, period=options.period)
-        logs = survey_logs(sources, workers=workers)
+        logs = survey_logs(_sources(options), workers=workers)
         robot = robot_of_recordings(options.robot, logs.facts, locked=options.lock)
         model = model_of(robot, options.model, logs.facts)
     with working("identifying"):
@@ -141,24 +146,30 @@ def _identified_by_workers(options: Options) -> Estimate:
         )
 
 
-def _estimator(options: Options) -> Estimator:
+def _sources(options: Options) -> tuple[LogSource, ...]:
+    from tauhat.cli.inputs import sources_of
+
+    return sources_of(options.logs, map_file=options.map_file, rows=options.rows, period=options.period)
+
+
+def _estimator(options: Options, loop: ClosedLoop | None = None) -> Estimator:
     from tauhat.estimation.essential import EssentialLeastSquares
     from tauhat.estimation.estimators import estimator_named
 
-    named = estimator_named(options.estimator)
+    named = estimator_named(options.estimator, loop=loop)
     return EssentialLeastSquares(inner=named) if options.essential else named
 
 
-def _identified(model: TorqueModel, recordings: Sequence[Recording], options: Options) -> Estimate:
+def _identified(
+    model: TorqueModel, recordings: Sequence[Recording], estimator: Estimator, options: Options
+) -> Estimate:
     """Return the estimate, of the model that cross-validation chose where that was asked for."""
     from tauhat.cli.models import AUTO
     from tauhat.estimation.identify import identify
     from tauhat.estimation.selecting import identify_selected
 
     way = identify_selected if options.model.strip() == AUTO else identify
-    return way(
-        model, recordings, estimator=_estimator(options), cutoff=options.cutoff, constraints=_constraints(options)
-    )
+    return way(model, recordings, estimator=estimator, cutoff=options.cutoff, constraints=_constraints(options))
 
 
 def _constraints(options: Options) -> PhysicalConstraints | None:
@@ -179,6 +190,8 @@ def _view(estimate: Estimate, options: Options) -> Iterator[RenderableType]:
     from tauhat.cli.views.estimate import estimate_view
 
     yield from estimate_view(estimate)
+    if options.controller is not None:
+        yield unbroken(f"Simulated with the controller of {options.controller}.")
     through = f" --map {options.map_file}" if options.map_file else ""
     yield unbroken(
         f"Written: {options.output}\n"
