@@ -9,8 +9,6 @@ on (`limit_oracle.py`). The design is a genetic one of 4 motions, or a gradient 
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
 import time
 import warnings
@@ -20,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from limit_oracle import Oracle, joint_margins
+from random_cases import options_parser, show
 
 from tauhat.errors import ExcitationError, TauhatWarning
 from tauhat.excitation import DesignSettings, GeneticSettings, LimitSet, design, parse_limits
@@ -156,25 +155,12 @@ def summary(outcomes: list[Outcome]) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0, help="seed of the first file")
+    parser = options_parser(__doc__, case="file")
     parser.add_argument("--gradient", action="store_true", help="gradient design from one start instead")
     options = parser.parse_args()
     method = "gradient" if options.gradient else "genetic"
     outcomes = [outcome(seed, method=method) for seed in range(options.first, options.first + options.count)]
-    rows = summary(outcomes)
-    if options.json:
-        print(json.dumps(rows))
-        return
-    for name, value in rows.items():
-        if isinstance(value, dict):
-            print(name)
-            for key, part in value.items():
-                print(f"  {key:50} {part if isinstance(part, int) else format(part, '.3g')}")
-        else:
-            print(f"{name:28} {value}")
+    show(summary(outcomes), as_json=options.json)
 
 
 if __name__ == "__main__":

@@ -54,9 +54,9 @@ def command(folder: Path) -> list[str]:
     return [sys.executable, "-m", "tauhat", "run", str(folder), "--json"]
 
 
-def new_folder(folder: Path) -> Path:
-    folder.mkdir()
-    (folder / "project.toml").write_text(PROJECT, encoding="utf-8")
+def new_folder(folder: Path, text: str = PROJECT) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "project.toml").write_text(text, encoding="utf-8")
     return folder
 
 
@@ -68,11 +68,10 @@ def finished(folder: Path) -> dict:
 
 
 def left_in(folder: Path) -> dict[str, str]:
-    files = [path for path in folder.rglob("*") if path.is_file() and ".tauhat" not in path.parts]
-    return {
-        path.relative_to(folder).as_posix(): hashlib.sha256(WRITTEN.sub(b"", path.read_bytes())).hexdigest()
-        for path in files
-    }
+    """Every file of a project's folder with the digest of its content, the time in the report left out."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and ".tauhat" not in path.parts)
+    contents = {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+    return {name: hashlib.sha256(WRITTEN.sub(b"", content)).hexdigest() for name, content in contents.items()}
 
 
 def killed(folder: Path, seconds: float) -> bool:

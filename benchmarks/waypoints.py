@@ -10,8 +10,6 @@ the planner does not use), the distance of every zone, and dq and ddq against th
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
 import time
 from collections import Counter
@@ -20,6 +18,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from random_cases import options_parser, show
 from scipy.spatial.transform import Rotation
 
 from tauhat.errors import ExcitationError
@@ -225,22 +224,9 @@ def summary(outcomes: list[Outcome]) -> dict[str, Any]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--first", type=int, default=0, help="seed of the first program")
-    options = parser.parse_args()
+    options = options_parser(__doc__, case="program").parse_args()
     rows = summary([outcome(seed) for seed in range(options.first, options.first + options.count)])
-    if options.json:
-        print(json.dumps(rows))
-        return
-    for name, value in rows.items():
-        if isinstance(value, dict):
-            print(name)
-            for key, part in value.items():
-                print(f"  {key:58} {part:.9g}")
-        else:
-            print(f"{name:38} {value}")
+    show(rows, as_json=options.json, digits=9)
 
 
 if __name__ == "__main__":

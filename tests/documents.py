@@ -19,6 +19,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -26,10 +27,14 @@ from tauhat.cli.app import app
 from tauhat.dynamics import load_model
 from tauhat.estimation.constraints_file import load_constraints
 from tauhat.excitation import load_limits
+from tauhat.excitation.task_design import load_task
 from tauhat.project import load_project
-from tauhat.recordings import load_map
+from tauhat.recordings import LogSource, load_map, write_columns
+from tauhat.recordings.mapfile import expand_columns
 from tauhat.robots import Robot, builtin_names, load_robot, robot_from_dh
+from tauhat.simulation.controller_file import load_closed_loop
 from tauhat.simulation.experiment_file import load_experiment
+from tauhat.studies.real_logs import load_cases
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")])
@@ -197,20 +202,37 @@ TOML_KINDS: Mapping[str, Callable[[dict[str, Any]], bool]] = {
     "robot": lambda data: isinstance(data.get("joints"), list),
     "map": lambda data: "time" in data and "position" in data,
     "model": lambda data: "term" in data,
+    "cases": lambda data: "case" in data,
     "constraints": lambda data: "link" in data or "pull" in data,
+    "controller": lambda data: "kind" in data and "reference" in data,
     "experiment": lambda data: isinstance(data.get("robot"), str) and "joints" not in data,
     "project": lambda data: isinstance(data.get("robot"), dict),
+    "task": lambda data: "region" in data,
     "limits": lambda data: bool({"collision", "tool", "start", "planes", "boxes"} & set(data)),
 }
 TOML_READERS: Mapping[str, Callable[[Path], object]] = {
     "robot": lambda path: robot_from_dh(path.read_text(encoding="utf-8")),
     "map": load_map,
     "model": lambda path: load_model(path, arm_of(path)),
+    "cases": load_cases,
     "constraints": load_constraints,
+    "controller": lambda path: read_controller(path),
     "experiment": load_experiment,
     "project": load_project,
+    "task": lambda path: load_task(path, load_robot("ur5e")),
     "limits": lambda path: load_limits(path, load_robot("ur5e")),
 }
+
+
+def read_controller(path: Path) -> None:
+    """Read a controller of the two-link arm, on a log that has the columns of its reference."""
+    t = np.arange(0.0, 1.0, 1e-2)
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    tables = [table for table in data["reference"].values() if isinstance(table, dict)]
+    asked = [name for table in tables for name in expand_columns(table["columns"], str(path))]
+    log = path.with_name("asked.csv")
+    write_columns({"t": t, **{str(name): np.sin(t) for name in (*asked, "q_1", "q_2", "tau_1", "tau_2")}}, log)
+    load_closed_loop(path, load_robot("two_link"), [LogSource(path=log)])
 
 
 def arm_of(model: Path) -> Robot:

@@ -14,6 +14,11 @@ from tauhat.robots import Joint, Limits, Robot, inertia_at_origin
 
 PLANAR = ((1.2, 0.5, 0.21, 0.031), (0.8, 0.4, 0.17, 0.019))  # mass [kg], length [m], centre [m], Izz at centre [kg m^2]
 WIDTHS = (0.05, 0.08)
+WORKING_POSES = {  # of built-in robots, [rad]: within reach of the table, away from singularities
+    "ur5e": np.array([0.0, -1.3, 1.6, -1.8, -1.4, 0.0]),
+    "crs_a465": np.array([0.2, 0.3, 1.2, 0.1, 1.0, 0.0]),
+    "panda": np.array([0.0, -0.4, 0.2, -1.9, 0.1, 1.7, 0.7]),
+}
 
 
 def random_inertia(rng: np.random.Generator) -> FloatArray:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import pytest
 
-pytest.importorskip("distributed")
+pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
 
 import tauhat
 from tauhat.cluster import ClusterWorkers, _Piece

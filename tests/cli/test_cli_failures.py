@@ -167,7 +167,9 @@ def test_an_output_that_would_replace_its_input_is_refused(tauhat: Tauhat, works
     shutil.copy(workshop.text_log, log)
     shutil.copy(workshop.estimate, estimate)
     assert "overwrite" in refused(tauhat("identify", "two_link", log, "-o", log))
-    assert "overwrite" in refused(tauhat("report", estimate, "-o", estimate))
+    alias = tmp_path / "alias.html"
+    alias.symlink_to(estimate)
+    assert "overwrite" in refused(tauhat("report", estimate, "-o", alias))
     assert log.read_bytes() == workshop.text_log.read_bytes()
     assert estimate.read_bytes() == workshop.estimate.read_bytes()
 
@@ -211,14 +213,16 @@ def test_a_damaged_parquet_log_causes_one_line_and_no_panic_text(workshop: Works
 
 
 def test_a_folder_in_place_of_the_output_is_refused(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:
-    missing = tmp_path / "missing" / "e.json"
-    for path in (tmp_path, missing):
+    folder = tmp_path / "folder.html"
+    folder.mkdir()
+    for path in (folder, tmp_path / "missing" / "e.html"):
         refused(tauhat("identify", "two_link", workshop.log, "-o", path, "--json"))
         refused(tauhat("report", workshop.estimate, "-o", path))
+    assert list(folder.iterdir()) == []
     refused(tauhat("simulate", "two_link", "-o", tmp_path / "log.docx", "--seconds", 1, "--rate", 50))
     (tmp_path / "file").write_text("")
     refused(tauhat("demo", "--robot", "two_link", "-o", tmp_path / "file" / "demo"))
-    assert [file.name for file in tmp_path.iterdir()] == ["file"]
+    assert {file.name for file in tmp_path.iterdir()} == {"file", "folder.html"}
 
 
 @pytest.mark.parametrize(

@@ -153,6 +153,8 @@ def test_the_report_takes_a_motion_in(tauhat: Tauhat, workshop: Workshop, motion
     assert "Which parameters it sees well" not in page.read_text(encoding="utf-8")
     made("report", workshop.estimate, workshop.other_log, "-o", page, "--motion", motion)
     assert "Which parameters it sees well" in page.read_text(encoding="utf-8")
-    result = tauhat("report", workshop.estimate, "-o", motion, "--motion", motion)
+    alias = tmp_path / "alias.html"
+    alias.symlink_to(motion)
+    result = tauhat("report", workshop.estimate, "-o", alias, "--motion", motion)
     assert result.exit_code == 1
     assert "overwrite" in result.stderr

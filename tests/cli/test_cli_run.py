@@ -80,7 +80,12 @@ def test_a_run_that_waits_for_logs_says_so_and_ends_with_status_1(tauhat: Tauhat
 
 
 def test_a_project_that_is_not_there_is_an_error_of_one_line(tauhat: Tauhat, tmp_path: Path):
-    result = tauhat("run", tmp_path / "nowhere.toml")
-    assert result.exit_code == 1
-    assert "no such file" in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
+    for given, folder in (
+        (tmp_path / "nowhere.toml", tmp_path / "nowhere"),
+        (tmp_path / "arm", tmp_path / "arm"),
+        (tmp_path, tmp_path),
+    ):
+        result = tauhat("run", given)
+        assert result.exit_code == 1
+        assert f"no such project; tauhat run --new ROBOT {folder} makes one" in result.stderr
+        assert len(result.stderr.strip().splitlines()) == 1

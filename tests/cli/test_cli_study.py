@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable
+from io import StringIO
 from pathlib import Path
 
 import pytest
 from cli_workshop import Tauhat
+from rich.console import Console
 
+from tauhat.cli.views.study import study_view
+from tauhat.report.study_page import shown_table
 from tauhat.studies import registry
 from tauhat.studies.crs_a465 import CrsA465Study
 from tauhat.studies.study import Chapter, Study, StudyResult, Table
@@ -88,3 +93,43 @@ def test_an_unknown_study_is_refused_with_the_known_ones(tauhat: Tauhat) -> None
     assert result.exit_code == 1
     assert "unknown study" in result.stderr
     assert "crs-a465" in result.stderr
+
+
+WIDE = Table(
+    title="Errors of everything",
+    header=("", "cause of the error", *(f"share number {column} [%]" for column in range(14)), "what to do about it"),
+    rows=tuple(
+        (
+            row,
+            f"cause {row} of many that are not short",
+            *(row + column / 7.0 for column in range(14)),
+            "leave [it] alone",
+        )
+        for row in range(3)
+    ),
+)
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120, 400])
+def test_a_table_loses_no_cell_and_no_head_in_a_narrow_terminal(width: int) -> None:
+    told = StudyResult(
+        name="wide", title="Wide", summary="-", settings={}, chapters=(Chapter(title="All", text=(), tables=(WIDE,)),)
+    )
+    console = Console(width=width, file=StringIO(), highlight=False)
+    for part in study_view(told):
+        console.print(part)
+    text = console.file.getvalue()
+    assert max(map(len, text.splitlines())) <= width
+    words = Counter(text.split())
+    shown = shown_table(WIDE)
+    wanted = Counter(word for row in (shown.header, *shown.rows) for cell in row for word in cell.text.split())
+    assert not wanted - words
+    assert ("continued" in text) == (width < 200)
+
+
+def test_numbers_that_are_rounding_beside_others_of_their_column_are_zero() -> None:
+    table = Table(title="t", header=("joint", "a", "b"), rows=(("one", -6.94e-18, 3e-18), ("two", 0.128, 2e-18)))
+    assert [[cell.text for cell in row] for row in shown_table(table).rows] == [
+        ["one", "0", "3e-18"],
+        ["two", "0.128", "2e-18"],
+    ]

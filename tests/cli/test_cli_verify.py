@@ -30,7 +30,7 @@ def test_every_check_adds_its_part_to_the_document(tauhat: Tauhat, workshop: Wor
 
 def test_people_get_tables(tauhat: Tauhat, workshop: Workshop, long_log: Path) -> None:
     shown = tauhat("verify", workshop.estimate, long_log, "--residuals", "--static").stdout
-    assert "0 of colour is white noise" in shown
+    assert "colour 0 is white noise" in shown
     assert "from both sides" in shown
 
 
@@ -59,3 +59,36 @@ def test_the_report_has_a_chapter_on_what_residuals_hold(
     assert "What the residuals still hold" in page.read_text(encoding="utf-8")
     assert tauhat("report", workshop.estimate, long_log, "-o", page).exit_code == 0
     assert "What the residuals still hold" not in page.read_text(encoding="utf-8")
+
+
+def test_residuals_without_a_log_are_refused_in_one_line(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:
+    result = tauhat("report", workshop.estimate, "--residuals", "-o", tmp_path / "r.html")
+    assert result.exit_code == 2
+    assert "needs a LOG that was not fitted" in result.stderr
+    assert not (tmp_path / "r.html").exists()
+
+
+def test_a_robot_in_the_place_of_its_estimate_is_told_what_to_do(tauhat: Tauhat, workshop: Workshop) -> None:
+    result = tauhat("verify", "two_link", workshop.log)
+    assert result.exit_code == 1
+    assert result.stderr == "error: two_link: a robot, not an estimate; identify it first: tauhat identify\n"
+
+
+def test_an_estimate_in_the_place_of_a_robot_is_told_what_it_is(tauhat: Tauhat, workshop: Workshop) -> None:
+    result = tauhat("inspect", workshop.estimate)
+    assert result.exit_code == 1
+    assert "JSON holds an estimate, not a robot; give the robot that it was identified from" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("report", "{estimate}", "-o", "{page}"), ("study", "crs-a465", "--seeds", "1", "-o", "{page}")],
+)
+def test_a_page_that_is_not_named_as_html_is_refused_before_any_work(
+    tauhat: Tauhat, workshop: Workshop, tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    page = tmp_path / "page.pdf"
+    result = tauhat(*(word.format(estimate=workshop.estimate, page=page) for word in words))
+    assert result.exit_code == 2
+    assert "a page is HTML" in result.stderr
+    assert not page.exists()

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from cli_workshop import Tauhat, Workshop
 
-from tauhat.cli.output import without_infinities
 from tauhat.cli.views.tables import aligned
 from tauhat.estimation import load_estimate
+from tauhat.plain_data import without_infinities
 
 
 def test_every_view_fits_eighty_columns(tauhat: Tauhat, workshop: Workshop, tmp_path: Path) -> None:

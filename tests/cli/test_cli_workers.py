@@ -42,6 +42,6 @@ def test_what_workers_cannot_do_is_refused(workshop, tmp_path, nowhere):
 
 
 def test_a_cluster_that_is_not_there_is_named_in_one_line(workshop, tmp_path, nowhere):
-    pytest.importorskip("distributed")
+    pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     words = ("identify", "two_link", workshop.log, "-o", tmp_path / "never.json")
     assert f"{nowhere}: no Dask scheduler can be reached" in refusal(*words, "--cluster", nowhere)

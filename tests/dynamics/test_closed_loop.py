@@ -204,7 +204,6 @@ def test_a_term_without_forward_dynamics_is_refused_by_name():
 
 
 def test_the_arm_moves_as_mujocos_does():
-    pytest.importorskip("mujoco")
     from tauhat.control import PDGravity
     from tauhat.dynamics import gravity_torque
     from tauhat.excitation import random_fourier

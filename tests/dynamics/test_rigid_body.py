@@ -7,6 +7,7 @@ import pinocchio
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pinocchio_oracle import mass_matrices
 
 from sample_arms import PLANAR, chain, planar_arm, random_states, random_tree, smooth_motion
 from tauhat.dynamics import bias_torque, gravity_torque, inverse_dynamics, mass_matrix, regressor
@@ -56,12 +57,9 @@ def test_torques_of_any_tree_are_pinocchios(seed, n_v, n_t):
 def test_mass_matrix_of_a_chain_is_pinocchios(seed, n_v):
     rng = np.random.default_rng(seed)
     robot = random_tree(rng, n_v, branching=0.0)
-    model = pinocchio_model(robot)
-    data = model.createData()
     q, _, _ = random_states(rng, 3, n_v)
-    for row, ours in zip(q, mass_matrix(robot, q), strict=True):
-        upper = np.triu(pinocchio.crba(model, data, row).reshape(n_v, n_v))
-        assert _close(ours, upper + np.triu(upper, 1).T)
+    for own, oracle in zip(mass_matrix(robot, q), mass_matrices(robot, q), strict=True):
+        assert _close(own, oracle)
 
 
 @given(seed=seeds, n_v=sizes)

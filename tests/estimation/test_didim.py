@@ -137,7 +137,9 @@ def test_the_estimate_file_tells_law_and_reference(tmp_path):
     estimate.save(tmp_path / "estimate.json")
     told = load_estimate(tmp_path / "estimate.json").estimator
     assert told["name"] == "didim"
-    assert told["loop"]["law"] == {"law": "pd-gravity", "kp": [500.0, 200.0], "kd": [40.0, 15.0], "ki": [0.0, 0.0]}
+    gains = {"kp": [500.0, 200.0], "kd": [40.0, 15.0], "ki": [0.0, 0.0]}
+    assert told["loop"]["law"] == {"law": "pd-gravity", **gains, "torque_limit": [None, None]}
+    assert told["loop"]["file"] is None
     assert told["loop"]["references"] == ["SampledReference"]
     assert json.loads(json.dumps(told["inner"]))["name"] == "wls"
 

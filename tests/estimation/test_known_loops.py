@@ -10,12 +10,12 @@ from simulated_logs import LATE, LAW, RATE, SECONDS, driven, planar_base, proble
 
 from sample_arms import Truth, motion_from_rest, planar_truth
 from tauhat.control import PD, PDFeedforward
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.dynamics.simulated_arm import Followed, Gains, Stepping, follow, simulated_arm
 from tauhat.errors import ModelError
 from tauhat.estimation.closed_loop import ClosedLoop, SampledReference
 from tauhat.estimation.didim import DirectInverse
 from tauhat.estimation.output_error import ClosedLoopInputError, ClosedLoopOutputError
-from tauhat.estimation.prior import nominal_parameters
 from tauhat.estimation.simulated_runs import simulated_runs
 from tauhat.estimation.simulating import Found, tried_in
 from tauhat.recordings.processing import Processing
@@ -29,7 +29,7 @@ def fed_forward() -> tuple[Recording, ClosedLoop, np.ndarray]:
     """Return the log of an arm heavier than its controller thinks, the loop, and the true base parameters."""
     truth = planar_truth()
     standard = np.concatenate([HEAVIER * truth.standard[:20], truth.standard[20:]])
-    known = Truth(truth.model, nominal_parameters(truth.model))
+    known = Truth(truth.model, nominal_standard_parameters(truth.model))
     t = np.arange(0.0, SECONDS, 1.0 / RATE)
     q, dq, ddq = motion_from_rest(2, t, seed=3)
     law = PDFeedforward(kp=LAW.kp, kd=LAW.kd)

@@ -67,7 +67,7 @@ def test_a_recursion_of_fewer_rows_than_parameters_is_refused(method):
     ("seconds", "message"), [(0.2, "no row|too few"), (0.4, "too few rows"), (0.9, "cannot determine 13 base")]
 )
 def test_a_network_is_not_judged_on_no_rows(seconds, message):
-    pytest.importorskip("sklearn")
+    pytest.importorskip("sklearn", reason="the extra `learning` is not installed")
     estimate = identify(TRUTH.model, [run(0)], processing=Processing(cutoff=2.0, motion_cutoff=20.0))
     with pytest.raises(TauhatError, match=message):
         learn_residual(estimate, [cut(seconds)])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytest.importorskip("distributed")
+pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
 
 from sample_arms import planar_arm, planar_truth
 from tauhat.cluster import ClusterWorkers

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from rough_logs import BASE, EXPECTED, TRUTH, clean, covered, problem_of, torque_error, white
 
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.errors import ModelError
 from tauhat.estimation import PriorLeastSquares, RidgeLeastSquares, WeightedLeastSquares
-from tauhat.estimation.prior import Pull, chosen_deviation, nominal_parameters
+from tauhat.estimation.prior import Pull, chosen_deviation
 from tauhat.estimation.problem import Problem
 from tauhat.recordings import Recording
 
@@ -66,7 +67,7 @@ def test_a_weak_pull_is_weighted_least_squares_and_a_strong_one_its_centre(metho
 
 def test_the_nominal_robot_is_what_the_prior_pulls_to():
     robot = TRUTH.model.robot
-    standard = nominal_parameters(TRUTH.model)
+    standard = nominal_standard_parameters(TRUTH.model)
     np.testing.assert_array_equal(standard[: robot.inertia.size], robot.inertia.ravel())
     assert not standard[robot.inertia.size :].any()
     problem = clean(0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 from waypoint_benchmark import NO_EXCESS, Outcome, outcome
 
-pytest.importorskip("ruckig")
+pytest.importorskip("ruckig", reason="the extra `planner` is not installed")
 
 SEEDS = range(200, 240)  # other programs than those of the benchmark
 

@@ -22,7 +22,7 @@ from tauhat.excitation.waypoints.time_law import RateLimits, TimeLaw
 from tauhat.robots import load_robot
 
 LIMITS = RateLimits(1.3, 4.0, 25.0)
-ruckig = pytest.importorskip("ruckig")
+ruckig = pytest.importorskip("ruckig", reason="the extra `planner` is not installed")
 
 
 def planned(

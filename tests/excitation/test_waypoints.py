@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from sample_arms import planar_arm
+from sample_arms import WORKING_POSES, planar_arm
 from tauhat.arrays import FloatArray
 from tauhat.errors import ExcitationError, MissingExtraError
 from tauhat.excitation import (
@@ -30,18 +30,13 @@ from tauhat.excitation.motion_file import motion_for
 from tauhat.recordings import write_recording
 from tauhat.robots import Pose, Robot, forward_kinematics, load_robot
 
-STARTS = {
-    "ur5e": np.array([0.0, -1.3, 1.6, -1.8, -1.4, 0.0]),
-    "crs_a465": np.array([0.2, 0.3, 1.2, 0.1, 1.0, 0.0]),
-    "panda": np.array([0.0, -0.4, 0.2, -1.9, 0.1, 1.7, 0.7]),
-}
-ROBOTS = {name: load_robot(name) for name in STARTS}
-UR5E, HOME = ROBOTS["ur5e"], STARTS["ur5e"]
+ROBOTS = {name: load_robot(name) for name in WORKING_POSES}
+UR5E, HOME = ROBOTS["ur5e"], WORKING_POSES["ur5e"]
 SLOW = WaypointSettings(tool=ToolLimits(speed=0.1, acceleration=0.5))
 
 
 def smooth(robot: Robot, **other: object) -> WaypointSettings:
-    pytest.importorskip("ruckig")
+    pytest.importorskip("ruckig", reason="the extra `planner` is not installed")
     jerk = 30.0 * motion_limits(robot).acceleration
     return WaypointSettings(limits=motion_limits(robot, jerk=jerk), ramps=JerkLimited(), **other)
 
@@ -63,9 +58,9 @@ def tool_speed(motion: WaypointMotion, t: FloatArray, h: float = 1e-5) -> FloatA
     return np.linalg.norm(ahead - behind, axis=1) / (2.0 * h)
 
 
-@pytest.mark.parametrize("name", STARTS)
+@pytest.mark.parametrize("name", WORKING_POSES)
 def test_a_line_move_takes_the_tool_along_the_line_and_turns_it_as_slerp_does(name: str):
-    robot, start = ROBOTS[name], STARTS[name]
+    robot, start = ROBOTS[name], WORKING_POSES[name]
     frame = robot.frames[-1].name
     first = forward_kinematics(robot, start, frame=frame)
     turn = Rotation.from_rotvec([0.2, -0.3, 0.25])
@@ -84,7 +79,7 @@ def test_a_line_move_takes_the_tool_along_the_line_and_turns_it_as_slerp_does(na
 
 
 def test_a_seventh_joint_goes_straight_from_where_it_is_to_where_the_target_has_it():
-    robot, start = ROBOTS["panda"], STARTS["panda"]
+    robot, start = ROBOTS["panda"], WORKING_POSES["panda"]
     motion = waypoint_motion(robot, start, [LineMove(target=start + np.array([0.1, 0.1, 0.1, 0.1, 0.05, -0.1, 0.1]))])
     q = motion.sample(np.linspace(0.0, motion.duration, 50)).q
     (spare,) = motion.pieces[0].curve.solver.spare

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from sample_arms import WORKING_POSES
 from tauhat.errors import ExcitationError
 from tauhat.excitation import JointMove, LineMove, ToolLimits, WaypointMotion, WaypointSettings, Zone, waypoint_motion
 from tauhat.export.programs import ProgramSettings, signed_joints
 from tauhat.robots import Pose, forward_kinematics, load_robot
 
-STARTS = {"ur5e": [0.0, -1.3, 1.6, -1.8, -1.4, 0.0], "crs_a465": [0.2, 0.3, 1.2, 0.1, 1.0, 0.0]}
 TOOL = ToolLimits(speed=0.5, acceleration=4.0, turn_speed=2.0, turn_acceleration=16.0)
 
 
@@ -43,7 +43,7 @@ def program(key: str, seed: int) -> WaypointMotion:
     """
     rng = np.random.default_rng(seed)
     name = ("ur5e", "crs_a465")[seed % 2]
-    robot, start = load_robot(name), np.array(STARTS[name])
+    robot, start = load_robot(name), WORKING_POSES[name]
     pose = forward_kinematics(robot, start, frame="tool")
     lines = rng.random(int(rng.integers(3, 6))) < 0.5
     moves: list[JointMove | LineMove] = []

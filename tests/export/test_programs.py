@@ -10,6 +10,7 @@ import pytest
 from program_samples import TOOL, controller, programs
 from scipy.spatial.transform import Rotation
 
+from sample_arms import WORKING_POSES
 from tauhat.errors import ExportError
 from tauhat.excitation import JointMove, LineMove, WaypointMotion, WaypointSettings, Zone, waypoint_motion
 from tauhat.export.programs import DIALECTS, ControllerJoints, ProgramSettings, program_named, signed_joints
@@ -17,7 +18,7 @@ from tauhat.robots import Pose, forward_kinematics, load_robot
 
 KEYS = tuple(dialect.key for dialect in DIALECTS)
 SIX = ("urscript", "krl", "rapid", "fanuc")
-HOME = np.array([0.0, -1.3, 1.6, -1.8, -1.4, 0.0])
+HOME = WORKING_POSES["ur5e"]
 
 
 def again(key: str, motion: WaypointMotion, settings: ProgramSettings) -> tuple[WaypointMotion, int]:

@@ -1,52 +1,23 @@
-"""A project that is quick to go through, and what a test asks of a folder."""
+"""The project of `benchmarks/project_kills.py`, which is quick to go through, and what a test asks of a folder."""
 
 from __future__ import annotations
 
-import hashlib
-import re
+import sys
 from pathlib import Path
 
 import tauhat
 
-TEXT = """
-[robot]
-source = "two_link"
+BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")
+if BENCHMARKS not in sys.path:
+    sys.path.append(BENCHMARKS)
 
-[motion]
-seconds = 4.0
-periods = 1
-harmonics = 3
-starts = 1
+from project_kills import PROJECT, left_in, new_folder  # noqa: E402
 
-[record]
-rate = 200.0
+__all__ = ["ROBOT_FILE", "STEPS", "TEXT", "changed", "left_in", "new_folder"]
 
-[identify]
-model = "plain"
-constraints = "physical"
-
-[verify]
-seconds = 4.0
-
-[export]
-formats = ["urdf", "c"]
-"""
+TEXT = PROJECT
 ROBOT_FILE = Path(tauhat.__file__).parent / "robots" / "data" / "two_link.toml"
-_WRITTEN = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d UTC")  # the report says when it was written
 STEPS = ["robot", "motion", "record", "unseen", "check", "identify", "export", "verify", "report"]
-
-
-def new_folder(folder: Path, text: str = TEXT) -> Path:
-    folder.mkdir(parents=True)
-    (folder / "project.toml").write_text(text, encoding="utf-8")
-    return folder
-
-
-def left_in(folder: Path) -> dict[str, str]:
-    """Return every file of a project's folder with the digest of its content, the time in the report left out."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and ".tauhat" not in path.parts)
-    contents = {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
-    return {name: hashlib.sha256(_WRITTEN.sub(b"", content)).hexdigest() for name, content in contents.items()}
 
 
 def changed(folder: Path, before: str, after: str) -> None:

@@ -37,7 +37,7 @@ def test_settings_are_read_section_by_section(tmp_path: Path):
     project = loaded(tmp_path, TEXT)
     assert project.motion == DesignedMotion(seconds=4.0, periods=1, harmonics=3, starts=1)
     assert project.identify.model == "plain"
-    assert project.export.formats == ("urdf", "c")
+    assert project.export.formats == ("urdf", "mjcf", "c")
 
 
 def test_given_logs_need_no_motion_and_nothing_to_verify_on(tmp_path: Path):

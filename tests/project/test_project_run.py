@@ -28,7 +28,8 @@ def test_the_whole_way_leaves_everything_in_the_folder(finished: Path):
         "project.toml", "robot/robot.json", "motion/motion.parquet", "motion/design.json",
         "recordings/identification.parquet", "recordings/identification.truth.json",
         "recordings/verification.parquet", "recordings/verification.truth.json",
-        "checks.json", "estimate.json", "verification.json", "report.html", "export/robot.urdf", "export/robot.h",
+        "checks.json", "estimate.json", "verification.json", "report.html", "export/robot.urdf", "export/robot.xml",
+        "export/robot.h",
     }  # fmt: skip
     assert load_estimate(finished / "estimate.json").relative_rms < 0.05
     (log,) = json.loads((finished / "verification.json").read_text("utf-8"))["logs"]
@@ -57,7 +58,7 @@ def test_a_second_run_makes_nothing(folder: Path):
         ("rate = 200.0", "rate = 250.0", {"record", "unseen", "check", "identify"}),
         ('model = "plain"', 'model = "robust"', {"identify"}),
         ("[verify]\nseconds = 4.0", "[verify]\nseconds = 5.0", {"unseen"}),
-        ('["urdf", "c"]', '["urdf"]', {"export"}),
+        ('["urdf", "mjcf", "c"]', '["urdf"]', {"export"}),
         ("[export]", '[report]\ntitle = "Mine"\n[export]', {"report"}),
     ],
 )

@@ -140,6 +140,26 @@ def test_unknown_names_are_answered_with_the_columns_and_a_map_to_start_from(tmp
     assert_is_table(read_recording(path, map=log_map), rows)
 
 
+def test_a_map_to_start_from_takes_what_joints_measured_in_its_unit(tmp_path: Path) -> None:
+    header = "t,tcp_force1,tcp_force2,i_target1,i_target2,q_target1,q_target2,q_actual1,q_actual2,qd_actual1,qd_actual2"
+    path = tmp_path / "run.csv"
+    path.write_text(f"{header},i_actual1,i_actual2\n" + f"{','.join(['0'] * 13)}\n" * 3, encoding="utf-8")
+    signals = parse_map(map_skeleton(path))
+    assert (signals.position.columns, signals.velocity.columns, signals.torque.columns) == (
+        ("q_actual1", "q_actual2"),
+        ("qd_actual1", "qd_actual2"),
+        ("i_actual1", "i_actual2"),
+    )
+    assert (signals.velocity.unit, signals.torque.unit) == (("rad/s",), ("A",))
+
+
+def test_an_estimate_is_not_taken_for_a_log(tmp_path: Path) -> None:
+    path = tmp_path / "estimate.json"
+    path.write_text('{\n "schema": "tauhat/estimate"\n}', encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"JSON, not a log; expected CSV, Parquet, NPZ or MAT"):
+        read_recording(path)
+
+
 def test_a_log_without_a_header_gets_a_map_of_indices(tmp_path: Path) -> None:
     path = write(tmp_path / "run.csv", text(table()))
     with pytest.raises(MapError, match="7 columns without names"):

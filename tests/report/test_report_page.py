@@ -210,6 +210,7 @@ def test_findings_are_listed_gravest_first_and_their_absence_is_not_taken_for_he
     assert text.index("torque is zero") < text.index("some <note>") < text.index("the clock is even")
     assert "look at the cable" in text
     assert "nothing doubtful" not in text
+    assert "Of the logs that were verified on; tauhat check tells the same of those that were fitted" in text
     assert "found nothing doubtful" in parsed(write_report(tmp_path / "b.html", estimate, findings=findings[:1])).text
     assert "were not checked" in parsed(write_report(tmp_path / "c.html", estimate)).text
 

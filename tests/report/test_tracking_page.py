@@ -86,7 +86,9 @@ def test_trajectories_are_those_of_the_best_controller_of_each_knowledge():
 def test_bars_leave_out_what_failed_and_use_a_logarithmic_axis():
     bars = json.loads(tracking(COMPARISON).plots[0].json)
     assert [trace["name"] for trace in bars["data"]] == ["PD", "worse", "better", "identified"]
-    assert bars["layout"]["yaxis"]["type"] == "log"
+    axis = bars["layout"]["yaxis"]
+    assert axis["type"] == "log"
+    assert axis["ticktext"] == [f"{mark:g}" for mark in axis["tickvals"]]
 
 
 def test_a_recording_done_again_shows_both_ways_and_what_could_not_be_simulated():

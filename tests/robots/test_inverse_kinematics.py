@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sample_arms import chain
+from sample_arms import WORKING_POSES, chain
 from tauhat.errors import RobotError
 from tauhat.robots import (
     Pose,
@@ -17,20 +17,14 @@ from tauhat.robots import (
 )
 from tauhat.robots.inverse_kinematics import FrameKinematics
 
-SEEDS = {
-    "ur5e": np.array([0.0, -1.3, 1.6, -1.8, -1.4, 0.0]),
-    "crs_a465": np.array([0.2, 0.3, 1.2, 0.1, 1.0, 0.0]),
-    "panda": np.array([0.0, -0.4, 0.2, -1.9, 0.1, 1.7, 0.7]),
-}
-
 
 def tool(robot: Robot) -> str:
     return robot.frames[-1].name if robot.frames else robot.joint_names[-1]
 
 
-@pytest.mark.parametrize("name", SEEDS)
+@pytest.mark.parametrize("name", WORKING_POSES)
 def test_positions_found_from_a_seed_nearby_have_the_pose(name: str):
-    robot, seed, rng = load_robot(name), SEEDS[name], np.random.default_rng(3)
+    robot, seed, rng = load_robot(name), WORKING_POSES[name], np.random.default_rng(3)
     for _ in range(8):
         pose = forward_kinematics(robot, seed + rng.uniform(-0.3, 0.3, robot.n_v), frame=tool(robot))
         q = inverse_kinematics(robot, pose, seed=seed, frame=tool(robot))
@@ -41,7 +35,7 @@ def test_positions_found_from_a_seed_nearby_have_the_pose(name: str):
 
 
 def test_an_arm_of_six_joints_keeps_the_configuration_of_the_seed():
-    robot, seed = load_robot("ur5e"), SEEDS["ur5e"]
+    robot, seed = load_robot("ur5e"), WORKING_POSES["ur5e"]
     wanted = seed + np.array([0.2, -0.1, 0.15, 0.1, 0.2, -0.3])
     pose = forward_kinematics(robot, wanted, frame="tool")
     assert np.abs(inverse_kinematics(robot, pose, seed=seed, frame="tool") - wanted).max() < 1e-9
@@ -75,7 +69,7 @@ def test_jacobian_and_drift_are_the_derivatives_of_the_forward_kinematics():
 
 
 def test_a_stretched_elbow_and_an_aligned_wrist_are_singular():
-    robot, q = load_robot("ur5e"), SEEDS["ur5e"]
+    robot, q = load_robot("ur5e"), WORKING_POSES["ur5e"]
     assert singularity_distance(robot, q, frame="tool") > 0.1
     for joint in (2, 4):
         bad = q.copy()
@@ -87,11 +81,11 @@ def test_a_pose_out_of_reach_is_refused_with_how_far_it_is():
     robot = load_robot("ur5e")
     far = Pose(rotation=np.eye(3), translation=np.array([2.0, 0.0, 0.3]))
     with pytest.raises(RobotError, match=r"ur5e, frame tool: the pose is not reached; got 1\d{3} mm and .* rad away"):
-        inverse_kinematics(robot, far, seed=SEEDS["ur5e"], frame="tool")
+        inverse_kinematics(robot, far, seed=WORKING_POSES["ur5e"], frame="tool")
 
 
 def test_a_singular_pose_is_refused_by_name():
-    robot, q = load_robot("ur5e"), SEEDS["ur5e"].copy()
+    robot, q = load_robot("ur5e"), WORKING_POSES["ur5e"].copy()
     q[4] = 1e-3
     pose = forward_kinematics(robot, q, frame="tool")
     with pytest.raises(RobotError, match=r"singular position only; expected smallest singular value >= 0.01"):
@@ -108,4 +102,4 @@ def test_a_pose_beyond_a_range_is_refused_with_the_joint():
 
 def test_an_unknown_frame_is_refused():
     with pytest.raises(RobotError, match="no such frame"):
-        singularity_distance(load_robot("ur5e"), SEEDS["ur5e"], frame="tol")
+        singularity_distance(load_robot("ur5e"), WORKING_POSES["ur5e"], frame="tol")

@@ -169,6 +169,12 @@ def test_an_experiment_is_told_from_a_robot(tmp_path: Path) -> None:
     assert [is_experiment(path) for path in (robot, broken, tmp_path / "none.toml", "ur5e")] == [False] * 4
 
 
+def test_a_project_is_told_from_an_experiment(plan: Plan) -> None:
+    project = '[robot]\nsource = "two_link"\n[record]\nkind = "simulate"\n'
+    with pytest.raises(SimulationError, match="a project, not an experiment; go its way with tauhat run"):
+        plan(project)
+
+
 def test_a_random_motion_refuses_limits_that_it_would_not_keep(plan: Plan, tmp_path: Path) -> None:
     (tmp_path / "limits.toml").write_text("[torque]\nfraction = 0.8\n", encoding="utf-8")
     with pytest.raises(SimulationError, match="a random motion keeps no further limits"):

@@ -17,7 +17,7 @@ from tauhat.simulation import Encoder, perturbed, tracking_gains
 from tauhat.studies.gain_rehearsal import Judged, Price, Rehearsal, rehearsal_settings
 from tauhat.studies.gain_tuning import GainSearch, tune_gains
 
-pytest.importorskip("optuna")
+pytest.importorskip("optuna", reason="the extra `tuning` is not installed")
 ARM = load_robot("ur5e")
 SEARCH = GainSearch(trials=10, seed=2)
 

@@ -159,6 +159,19 @@ def test_words_and_tables_follow_the_figures(found: Findings) -> None:
     assert answer is not None
     assert f"for 5 %, {answer.seconds:g} s of motion with {answer.sensors} sensors will do" in summary_of(found)
     assert "nothing that was tried stays within 0.01 %" in summary_of(replace(found, target=1e-4))
+
+
+@pytest.mark.parametrize(
+    ("robots", "words"),
+    [
+        (1, "3 % (one robot)."),
+        (2, "3 % (median of 2 robots)."),
+        (5, "3 % (median of 5 robots; eight of ten are at 3 to 3 %)."),
+    ],
+)
+def test_tenths_are_told_of_enough_robots_alone(found: Findings, robots: int, words: str) -> None:
+    outcomes = grid({("fine", 2.0): robots * [0.03]})
+    assert words in summary_of(replace(found, outcomes=outcomes, target=None))
     marks = [row[-1] for row in chapters_of(found)[0].tables[0].rows]
     assert marks.count("cheapest") == 1
     assert [bool(mark) for mark in marks] == [cell.meets(0.05) for cell in found.cells]

@@ -6,6 +6,7 @@ import base64
 import json
 import math
 import re
+from dataclasses import replace
 from html import unescape
 from typing import Any
 
@@ -125,6 +126,25 @@ def test_a_line_with_an_interval_has_a_band_around_it() -> None:
     assert band["fill"] == "toself"
     assert values(line["y"]) == [3, 2, 1]
     assert second["name"] == "&lt;script&gt;alert(1)&lt;/script&gt;"
+
+
+@pytest.mark.parametrize(
+    ("values", "marks"),
+    [
+        ((0.2, 30.0), ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50", "100", "200", "500"]),
+        ((3.0, -1.0), ["1", "2", "5", "10", "20", "50"]),
+        ((1e-6, 1.0), ["1e-06", "1e-05", "0.0001", "0.001", "0.01", "0.1", "1"]),
+        ((1e-20, 1e5), ["1e-20", "1e-18", "1e-16"]),
+        ((0.0, -1.0), ["1", "2", "5"]),
+    ],
+)
+def test_a_logarithmic_axis_writes_whole_numbers(values: tuple[float, float], marks: list[str]) -> None:
+    series = (Series(name="one", x=("p", "q"), y=values),)
+    chart = replace(BARS, series=series, logarithmic=("y",))
+    axis = json.loads(study_plot(chart, key="k").json)["layout"]["yaxis"]
+    assert axis["ticktext"][: len(marks)] == marks
+    assert [float(text) for text in axis["ticktext"]] == pytest.approx(axis["tickvals"])
+    assert len(axis["ticktext"]) <= 13
 
 
 def test_what_cannot_stand_on_a_logarithmic_axis_is_left_out() -> None:

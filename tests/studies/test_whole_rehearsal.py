@@ -22,7 +22,7 @@ from tauhat.studies.whole_rehearsal.findings import JUDGED, Findings, modelled
 from tauhat.studies.whole_rehearsal.scene import UNSEEN, Scene, staged
 from tauhat.workers import LocalWorkers
 
-pytest.importorskip("optuna")
+pytest.importorskip("optuna", reason="the extra `tuning` is not installed")
 BODY = AttachedBody(name="payload", mass=1.0, centre=np.array([0.1, 0.0, 0.0]))
 
 

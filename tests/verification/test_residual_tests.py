@@ -139,8 +139,14 @@ def test_a_short_recording_is_refused():
 
 
 def test_a_ratio_of_no_joint_is_refused():
-    with pytest.raises(ModelError, match="gear ratios"):
+    with pytest.raises(ModelError, match=r"gear ratio of an unknown joint; got elbow; known names: j1, j2"):
         residual_tests(right_model(), [log(2)], gear_ratios={"elbow": 100.0})
+
+
+@pytest.mark.parametrize("ratio", [0.0, float("inf"), float("nan")])
+def test_a_ratio_that_is_none_is_refused(ratio):
+    with pytest.raises(ModelError, match=r"^j2: gear ratio; expected motor turns a turn of the joint, not 0"):
+        residual_tests(right_model(), [log(2)], gear_ratios={"j2": ratio})
 
 
 def test_no_recording_is_refused():
@@ -201,3 +207,15 @@ def test_chance_is_fishers():
 def test_many_tests_need_smaller_p_values():
     assert passing(np.array([0.04, 0.9, 0.8, 0.7]), rate=0.05) == -1.0
     assert passing(np.array([0.01, 0.02, 0.8, 0.7]), rate=0.05) == 0.02
+
+
+def test_silence_of_few_independent_rows_is_no_proof():
+    right = residual_tests(right_model(), [log(2)])[0]
+    assert right.silence == "no effect of the catalogue can be told in the residuals."
+    short, long = right.joints
+    short = replace(short, whiteness=short.whiteness._replace(effective=12.0))
+    assert (
+        "on j1 are worth fewer than 30 independent rows: effects may be there"
+        in replace(right, joints=(short, long)).silence
+    )
+    assert "on every joint are worth fewer" in replace(right, joints=(short, short)).silence

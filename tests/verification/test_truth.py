@@ -15,6 +15,7 @@ from tauhat.robots.library import load_robot
 from tauhat.simulation.experiment import ExperimentSettings, Simulation, simulate
 from tauhat.simulation.parameters import TrueParameters, nominal_parameters
 from tauhat.simulation.sensors import SensorErrors
+from tauhat.simulation.typical import typical_plant
 from tauhat.verification.truth import compare_with_truth, standard_parameters
 
 
@@ -87,6 +88,20 @@ def test_a_delay_of_the_log_that_the_estimate_makes_up_for_is_none_of_the_truths
     ]
     at_once, made_up_for = (compare_with_truth(estimate, truth).relative_rms for estimate in estimates)
     assert made_up_for < 1.2 * at_once + 1e-3
+
+
+def test_an_estimate_from_torques_behind_the_gear_is_compared_with_those() -> None:
+    robot, rng = load_robot("two_link"), np.random.default_rng(6)
+    motion = random_fourier(robot, period=5.0, harmonics=4, rng=rng)
+    sensors = SensorErrors(torque_noise=0.05, torque_side="link")
+    truth = typical_plant(robot, "spring", rng=rng)
+    settings = ExperimentSettings(sample_rate=250.0, sensors=sensors)
+    done = simulate(robot, motion, rng=rng, parameters=truth, settings=settings)
+    estimate = identify(torque_model(robot, "inertia,offset,spring"), [done.recording])
+    there = compare_with_truth(estimate, done.truth, torque_side="link")
+    assert there.relative_rms < 0.01
+    assert there.share_inside > 0.7
+    assert compare_with_truth(estimate, done.truth).relative_rms > 0.05
 
 
 def test_a_wrong_truth_is_seen(simulated: tuple[TorqueModel, Simulation], estimate: Estimate) -> None:

@@ -12,6 +12,7 @@ from tauhat.errors import TauhatWarning
 
 if TYPE_CHECKING:
     from tauhat.cli.options import Window
+    from tauhat.estimation.closed_loop import ClosedLoop
     from tauhat.estimation.estimate import Estimate
     from tauhat.estimation.log_survey import LogFacts
     from tauhat.recordings.log_source import LogSource
@@ -34,6 +35,13 @@ def sources_of(
     from tauhat.recordings.log_source import LogSource
 
     return tuple(LogSource(path=log, map=map_file, rows=rows, period=period) for log in logs)
+
+
+def loop_of(controller: Path | None, robot: Robot, sources: Sequence[LogSource]) -> ClosedLoop | None:
+    """Return how the robot was driven in these logs, where the file of its controller is given."""
+    from tauhat.simulation.controller_file import load_closed_loop
+
+    return None if controller is None else load_closed_loop(controller, robot, sources)
 
 
 def averaged(recordings: Sequence[Recording], *, period: float | None) -> tuple[Recording, ...]:

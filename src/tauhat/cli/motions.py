@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from tauhat.excitation.design import Design
     from tauhat.robots.robot import Robot
 
-__all__ = ["check_motion_output", "motion_for", "numbered", "write_motion"]
+__all__ = ["check_motion_output", "motion_for", "named", "numbered", "write_motion"]
 
 _PROGRAM = ".script"
 
@@ -48,7 +48,12 @@ def write_motion(found: Design, robot: Robot, path: Path, *, rate: float, period
 
 def numbered(path: Path, count: int) -> tuple[Path, ...]:
     """Return a path for each motion: `path` itself for one, else `run-1.csv.gz`, `run-2.csv.gz` for `run.csv.gz`."""
-    if count == 1:
+    return named(path, tuple(str(number) for number in range(1, count + 1)))
+
+
+def named(path: Path, names: tuple[str, ...]) -> tuple[Path, ...]:
+    """Return a path for each name: `path` itself for one, else `run-fast.csv.gz`, .. for `run.csv.gz`."""
+    if len(names) == 1:
         return (path,)
     stem, dot, ending = path.name.partition(".")
-    return tuple(path.with_name(f"{stem}-{number}{dot}{ending}") for number in range(1, count + 1))
+    return tuple(path.with_name(f"{stem}-{name}{dot}{ending}") for name in names)

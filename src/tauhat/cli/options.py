@@ -35,6 +35,13 @@ def window(text: str) -> Window:
         raise typer.BadParameter(str(error)) from error
 
 
+def page(text: str) -> Path:
+    """Return the path of a page to be written: whatever its name says, it is HTML."""
+    if Path(text).suffix.lower() not in {".html", ".htm"}:
+        raise typer.BadParameter(f"a page is HTML, its name ends in .html: {text}")
+    return Path(text)
+
+
 def locks(text: str) -> Locks:
     """Return the joints that NAME[=VALUE],... names; without a value a joint is frozen at zero."""
     positions = Locks()
@@ -64,6 +71,14 @@ RobotArgument: TypeAlias = Annotated[
     str,
     typer.Argument(
         metavar="ROBOT", help="Built-in name (see `tauhat robots`), .urdf file or .toml DH table.", show_default=False
+    ),
+]
+RobotOrExperimentArgument: TypeAlias = Annotated[
+    str,
+    typer.Argument(
+        metavar="ROBOT",
+        help="Built-in name (see `tauhat robots`), .urdf file, .toml DH table, or EXPERIMENT.toml.",
+        show_default=False,
     ),
 ]
 EstimateArgument: TypeAlias = Annotated[
@@ -152,6 +167,16 @@ MotionOption: TypeAlias = Annotated[
         readable=False,
     ),
 ]
+ControllerOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--controller",
+        metavar="CONTROLLER.toml",
+        help="Law, gains and reference of the recorded robot, for estimators that simulate it.",
+        show_default=False,
+        readable=False,
+    ),
+]
 ClusterOption: TypeAlias = Annotated[
     str | None,
     typer.Option(
@@ -160,6 +185,24 @@ ClusterOption: TypeAlias = Annotated[
         help="Dask scheduler whose workers do the work, such as tcp://10.0.0.5:8786.",
         show_default="this machine",
     ),
+]
+WorkersOption: TypeAlias = Annotated[
+    int | None, typer.Option("--workers", metavar="N", min=1, help="Processes.", show_default="one a core")
+]
+StudyPageOption: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="PAGE.html",
+        parser=page,
+        help="Page with all text and drawings.",
+        show_default=False,
+    ),
+]
+ExperimentSeedOption: TypeAlias = Annotated[
+    int | None,
+    typer.Option("--seed", min=0, help="Seed of everything random.", show_default="0 or the experiment's"),
 ]
 SeedOption: TypeAlias = Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")]
 JsonOption: TypeAlias = Annotated[

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import typer
+
+from tauhat.plain_data import without_infinities
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -31,12 +32,3 @@ def unbroken(text: str) -> Text:
     from rich.text import Text
 
     return Text(text, no_wrap=True, overflow="ignore")
-
-
-def without_infinities(value: Any) -> Any:
-    """Return plain data with null for every number that JSON cannot hold."""
-    if isinstance(value, Mapping):
-        return {key: without_infinities(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [without_infinities(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -172,7 +172,19 @@ def learning_along(
     diagonal = np.diag(mean)
     if not diagonal.min() > 0.0:
         raise ModelError("the motion does not move every parameter", where=f"parameter {int(np.argmin(diagonal)) + 1}")
-    scale = np.sqrt(diagonal * (1.0 + _DAMPED))
-    scaled = mean / np.outer(scale, scale) + _DAMPED * np.eye(regressor.n_b)
-    half = np.linalg.solve(np.linalg.cholesky(scaled), np.diag(1.0 / scale))
+    return even_learning(mean, time=time)
+
+
+def even_learning(mean: FloatArray, *, time: float) -> FloatArray:
+    """Return G with which all directions are learnt alike, `mean^-1 / time`, (n_b, n_b).
+
+    Parameters
+    ----------
+    mean : (n_b, n_b) of Y' K^-1 Y, with a diagonal above zero; that is damped a little before it is inverted
+    time : [s]
+    """
+    damped = mean + _DAMPED * np.diag(np.diag(mean))
+    scale = np.sqrt(np.diag(damped))
+    root = np.linalg.cholesky(damped / np.outer(scale, scale))
+    half = np.linalg.solve(root, np.diag(1.0 / scale))
     return np.asarray(half.T @ half / time)

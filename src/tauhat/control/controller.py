@@ -21,8 +21,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.control.laws import PD, PID, Feedforward, PDFeedforward, PDGravity, TrackingLaw
-from tauhat.errors import TauhatError
+from tauhat.control.laws import Feedforward, TrackingLaw
 
 
 class ControlSample(NamedTuple):
@@ -90,20 +89,6 @@ class TrackingController:
         return np.zeros_like(sample.q)
 
     def step(self, memory: FloatArray, sample: ControlSample) -> tuple[FloatArray, FloatArray]:
-        """Return the integral behind this step, and the law's torque.
-
-        Raises
-        ------
-        TauhatError
-            when the law is none of the library's.
-        """
-        law, (q, dq, q_ref, dq_ref) = self.law, sample[2:6]
-        if isinstance(law, PID):
-            return law.step(memory, q_ref - q, dq_ref - dq, period=sample.period)
-        if isinstance(law, PDGravity):
-            return memory, law.torque(q, dq, q_ref=q_ref, dq_ref=dq_ref, gravity_torque=sample.feedforward)
-        if isinstance(law, PDFeedforward):
-            return memory, law.torque(q, dq, q_ref=q_ref, dq_ref=dq_ref, model_torque=sample.feedforward)
-        if isinstance(law, PD):
-            return memory, law.torque(q, dq, q_ref=q_ref, dq_ref=dq_ref)
-        raise TauhatError("a tracking law without a step of its own", got=type(law).__name__)
+        """Return the integral behind this step, and the law's torque."""
+        _, period, q, dq, q_ref, dq_ref, _, feedforward, _ = sample
+        return self.law.step(memory, q_ref - q, dq_ref - dq, period=period, feedforward=feedforward)

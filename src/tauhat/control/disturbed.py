@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -16,6 +17,26 @@ _RECENT = 50  # [steps] over which the memory of jumps fades
 _RATTLING = 0.1  # share of these in which a torque jumps by more than its limit: the loop is unstable
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WrappedController(ABC):
+    """What a controller around another one takes over from it.
+
+    inner : the controller
+    """
+
+    inner: Controller
+
+    @property
+    def feedforward(self) -> Feedforward:
+        """The inner controller's."""
+        return self.inner.feedforward
+
+    @property
+    def torque_limit(self) -> FloatArray:
+        """The inner controller's, (n_v,) [Nm or N]."""
+        return self.inner.torque_limit
+
+
 class Counted(NamedTuple):
     """Memory of a controller within, and how many steps have passed."""
 
@@ -24,16 +45,14 @@ class Counted(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NoisySight:
+class NoisySight(WrappedController):
     """A controller that sees position and speed with noise.
 
     The noise is drawn beforehand and repeats after its last row, so that a step stays a pure function.
 
-    inner : the controller
     position, speed : (n, n_v) added to what it sees [rad, rad/s] or [m, m/s]
     """
 
-    inner: Controller
     position: FloatArray
     speed: FloatArray
 
@@ -43,16 +62,6 @@ class NoisySight:
             raise ArrayError("position is empty", where="noisy sight", expected="at least a row")
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "speed", frozen("speed", self.speed, position.shape, where="noisy sight"))
-
-    @property
-    def feedforward(self) -> Feedforward:
-        """The inner controller's."""
-        return self.inner.feedforward
-
-    @property
-    def torque_limit(self) -> FloatArray:
-        """The inner controller's."""
-        return self.inner.torque_limit
 
     def start(self, sample: ControlSample) -> Counted:
         """Return the inner controller's memory, and no step."""
@@ -77,18 +86,16 @@ class WatchedMemory(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Watched:
+class Watched(WrappedController):
     """A controller that gives up when the robot is lost: too far from its reference, or rattling.
 
     With torque limits an unstable loop seldom runs away: it swings between its limits, near the reference. A joint
     rattles when its torque jumps by more than its limit in more than a tenth of the last steps (counted with a memory
     that fades over 50).
 
-    inner : the controller
     farthest : (n_v,) [rad or m]
     """
 
-    inner: Controller
     farthest: FloatArray
 
     def __post_init__(self) -> None:
@@ -96,16 +103,6 @@ class Watched:
         if not (farthest > 0.0).all():
             raise ArrayError("farthest is not positive", where="watched controller", got=f"{farthest.min():g}")
         object.__setattr__(self, "farthest", farthest)
-
-    @property
-    def feedforward(self) -> Feedforward:
-        """The inner controller's."""
-        return self.inner.feedforward
-
-    @property
-    def torque_limit(self) -> FloatArray:
-        """The inner controller's."""
-        return self.inner.torque_limit
 
     def start(self, sample: ControlSample) -> WatchedMemory:
         """Return the inner controller's memory, and no jump."""

@@ -54,6 +54,28 @@ class TrackingLaw(ABC):
         """Gain of the integral, (n_v,) [Nm/(rad s)] or [N/(m s)]; zero without one."""
         return np.zeros(self.n_v)
 
+    def step(
+        self,
+        integral: FloatArray,
+        error: FloatArray,
+        error_rate: FloatArray,
+        *,
+        period: float,  # noqa: ARG002 (of laws with an integral)
+        feedforward: FloatArray | float = 0.0,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the integral behind this step, which a law without one leaves alone, and the torque, (n_v,) each.
+
+        `tau = clip(feedforward + kp e + kd de)`
+
+        Parameters
+        ----------
+        integral : (n_v,) of the position error so far [rad s or m s]; zeros at the start
+        error, error_rate : (n_v,) `q_ref - q` and `dq_ref - dq`
+        period : between two steps [s]
+        feedforward : (n_v,) of the kind that the law names [Nm or N]
+        """
+        return integral, self._clipped(feedforward + self.kp * error + self.kd * error_rate)
+
     def _clipped(self, wanted: FloatArray) -> FloatArray:
         # np.clip costs three times as much on the short arrays of a control step.
         return np.asarray(np.maximum(np.minimum(wanted, self.torque_limit), -self.torque_limit))
@@ -141,20 +163,20 @@ class PID(TrackingLaw):
         return self.ki
 
     def step(
-        self, integral: FloatArray, error: FloatArray, error_rate: FloatArray, *, period: float
+        self,
+        integral: FloatArray,
+        error: FloatArray,
+        error_rate: FloatArray,
+        *,
+        period: float,
+        feedforward: FloatArray | float = 0.0,
     ) -> tuple[FloatArray, FloatArray]:
         """Return the integral behind this step of the controller, and its torque, (n_v,) each.
 
-        `tau = clip(kp e + kd de + ki integral)`; then `integral + period e`, except on joints whose torque is at its
-        limit and whose error would drive it further.
-
-        Parameters
-        ----------
-        integral : (n_v,) of the position error so far [rad s or m s]; zeros at the start
-        error, error_rate : (n_v,) `q_ref - q` and `dq_ref - dq`
-        period : between two steps [s]
+        `tau = clip(feedforward + kp e + kd de + ki integral)`; then `integral + period e`, except on joints whose
+        torque is at its limit and whose error would drive it further. Parameters as those of every law.
         """
-        wanted = self.kp * error + self.kd * error_rate + self.ki * integral
+        wanted = feedforward + self.kp * error + self.kd * error_rate + self.ki * integral
         torque = self._clipped(wanted)
         winding = (np.abs(wanted) >= self.torque_limit) & (torque * error >= 0.0)
         return integral + np.where(winding, 0.0, period * error), torque

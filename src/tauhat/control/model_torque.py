@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from tauhat.arrays import FloatArray, frozen, read_only
 from tauhat.control.model_torque_kernel import model_torque_kernel
 from tauhat.dynamics.model import TorqueModel, torque_model
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.dynamics.passive_kernel import ELEMENT
 from tauhat.dynamics.simulated_arm import simulated_arm
 from tauhat.dynamics.tree import kernel_tree
 from tauhat.errors import ModelError
 from tauhat.robots.robot import Robot
 
-_NOMINAL = {"Ia": "rotor_inertia", "Fv": "viscous", "Fc": "coulomb"}
 _DESCRIBED_TERMS = "inertia,rotor,viscous,coulomb"
 
 
@@ -121,8 +121,4 @@ def model_torque(model: TorqueModel, standard: FloatArray) -> ModelTorque:
 def nominal_torque(robot: Robot) -> ModelTorque:
     """Return the torque of the robot's description: links, rotors, and what friction it states."""
     model = torque_model(robot, _DESCRIBED_TERMS)
-    values = [
-        float(getattr(robot.joints[parameter.joint], _NOMINAL[parameter.symbol]))
-        for parameter in model.parameters[10 * robot.n_v :]
-    ]
-    return model_torque(model, np.concatenate([robot.inertia.ravel(), values]))
+    return model_torque(model, nominal_standard_parameters(model))

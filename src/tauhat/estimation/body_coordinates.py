@@ -18,6 +18,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
+from tauhat.dynamics.nominal import DESCRIBED_DRIVES
 from tauhat.dynamics.terms import INERTIAL_SYMBOLS, Parameter
 from tauhat.estimation.pseudo_inertia import SIZE, inertial_parameters, pseudo_inertia, stacked, unstacked
 from tauhat.robots.joint import central_inertia
@@ -29,7 +30,6 @@ _THIN = 1e-2  # smallest eigenvalue of a nominal X: thinner nominal bodies are b
 _HEAVIER = 1e3  # largest factor between the masses that the torque asks for and those of the description
 _SILENT = 1e-9  # a column below this part of the largest is rounding and gives no scale
 _LENGTH = 0.1  # [m] distance between joints where all coincide
-_NOMINAL = {"Ia": "rotor_inertia", "Fv": "viscous", "Fc": "coulomb"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,8 +131,8 @@ def _others(
     scale = np.divide(size, norms, out=np.ones(n_u), where=norms > _SILENT * norms.max())
     nominal = np.zeros(n_u)
     for parameter, place in zip(parameters, places, strict=True):
-        if parameter.symbol in _NOMINAL:
-            value = float(getattr(robot.joints[parameter.joint], _NOMINAL[parameter.symbol]))
+        if parameter.symbol in DESCRIBED_DRIVES:
+            value = float(getattr(robot.joints[parameter.joint], DESCRIBED_DRIVES[parameter.symbol]))
             scale[place] = max(scale[place], value)
             nominal[place] = value / scale[place]
     return np.diag(scale), nominal

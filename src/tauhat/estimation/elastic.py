@@ -7,8 +7,7 @@ The squared error has many minima: a resonance that is off by more than its widt
 search therefore starts from many places. Minima that differ in their parameters and not in their residual, by an
 F-test, explain the recording equally well: then the recording cannot tell, and all are returned.
 
-Source: Oaki, Adachi, "Vibration parameter identification of
-elastic-joint robot arm", 2009.
+Source: Oaki, Adachi, "Vibration parameter identification of elastic-joint robot arm", 2009.
 """
 
 from __future__ import annotations

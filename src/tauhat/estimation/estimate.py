@@ -22,6 +22,7 @@ from tauhat.estimation.structure import Structure
 from tauhat.files import read_text, replace_file
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
+from tauhat.robots.library import builtin_names
 from tauhat.robots.robot import Robot
 
 SCHEMA = "tauhat/estimate"
@@ -279,6 +280,8 @@ def load_estimate(path: str | Path) -> Estimate:
     EstimateError
         when the file is missing, cut off, not an estimate, damaged or of a newer schema.
     """
+    if str(path) in builtin_names() and not Path(path).exists():
+        raise EstimateError("a robot, not an estimate", where=path, remedy="identify it first: tauhat identify")
     text = read_text(Path(path), error=EstimateError, largest=_LARGEST_FILE)
     try:
         data = json.loads(text)

@@ -72,18 +72,8 @@ class Estimator(ABC):
         """
         check_rows(evidence)
         solved = self.solve(evidence)
-        rank, condition = rank_and_condition(evidence, solved.weights)
-        return Solution(
-            values=solved.values,
-            covariance=honest_covariance(evidence, solved.weights, solved.values, ridge=self.ridge),
-            weights=solved.weights,
-            joint_rms=joint_residuals(evidence, solved.values),
-            torque_rms=joint_torques(evidence),
-            rank=rank,
-            condition=condition,
-            degrees=degrees_of_freedom(evidence),
-            passes=solved.passes,
-        )
+        spread = honest_covariance(evidence, solved.weights, solved.values, ridge=self.ridge)
+        return diagnosed(evidence, solved, covariance=spread)
 
 
 def check_rows(evidence: Evidence) -> None:
@@ -100,6 +90,39 @@ def degrees_of_freedom(evidence: Evidence) -> int:
     """Return the degrees of freedom of the standard errors: groups of time less one; rows where there is one group."""
     groups = number_of_groups(evidence)
     return groups - 1 if groups > 1 else evidence.n_v * evidence.n_t - evidence.n_b
+
+
+def diagnosed(
+    evidence: Evidence,
+    solved: Solved,
+    *,
+    covariance: FloatArray,
+    degrees: int | None = None,
+    cause: str = "solved",
+    advice: str = "",
+) -> Solution:
+    """Return values with what the evidence says of them: residuals, rank and condition, degrees of freedom.
+
+    Parameters
+    ----------
+    covariance : of the values, (n_b, n_b)
+    degrees : of freedom, where they are not those of the whole evidence
+    cause, advice : as the solution has them
+    """
+    rank, condition = rank_and_condition(evidence, solved.weights)
+    return Solution(
+        values=solved.values,
+        covariance=covariance,
+        weights=solved.weights,
+        joint_rms=joint_residuals(evidence, solved.values),
+        torque_rms=joint_torques(evidence),
+        rank=rank,
+        condition=condition,
+        degrees=degrees_of_freedom(evidence) if degrees is None else degrees,
+        passes=solved.passes,
+        cause=cause,
+        advice=advice,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,26 +22,11 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence
-from tauhat.estimation.least_squares import (
-    Estimator,
-    Solved,
-    WeightedLeastSquares,
-    check_rows,
-    degrees_of_freedom,
-)
+from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows, diagnosed
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.repeated_rows import RepeatedRows, repeated_rows
 from tauhat.estimation.rows import Rows
-from tauhat.estimation.solution import (
-    MOST_GROUPS,
-    Solution,
-    freed,
-    joint_residuals,
-    joint_torques,
-    rank_and_condition,
-    stacked,
-    widened,
-)
+from tauhat.estimation.solution import MOST_GROUPS, Solution, freed, stacked, widened
 
 _RANK = 1e-10  # singular values below this part of the largest are taken as zero
 
@@ -104,17 +89,10 @@ class MaximumLikelihood(Estimator):
         found = self.likeliest(products, start=np.diag(start.weights**-2.0))
         values = products.basis @ found.coordinates
         weights = np.diag(found.noise) ** -0.5
-        rank, condition = rank_and_condition(evidence, weights)
-        return Solution(
-            values=values,
+        return diagnosed(
+            evidence,
+            Solved(values, weights, found.passes),
             covariance=self._covariance(products, found),
-            weights=weights,
-            joint_rms=joint_residuals(evidence, values),
-            torque_rms=joint_torques(evidence),
-            rank=rank,
-            condition=condition,
-            degrees=degrees_of_freedom(evidence),
-            passes=found.passes,
             cause=self._cause(found),
             advice=self._advice(found.noise, problem.model.robot.joint_names),
         )

@@ -148,7 +148,7 @@ class ClosedLoopOutputError(OutputError):
         if not self.loop.known:
             raise ModelError(
                 "the position error of a closed loop says nothing without the robot's own law and reference",
-                remedy="give both: ClosedLoop(law=..., references=...), or take idim-iv or didim",
+                remedy="give both (--controller, or a ClosedLoop with law and references), or take idim-iv or didim",
             )
         return super(ClosedLoopOutputError, self).fit_problem(problem)
 

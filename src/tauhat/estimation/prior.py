@@ -21,7 +21,6 @@ predictions", 1974.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -30,31 +29,16 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.dynamics.terms import INERTIAL_SYMBOLS
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence
-from tauhat.estimation.least_squares import (
-    Estimator,
-    Solved,
-    WeightedLeastSquares,
-    check_rows,
-    degrees_of_freedom,
-)
+from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows, diagnosed
 from tauhat.estimation.problem import Problem
-from tauhat.estimation.solution import (
-    Solution,
-    block_moves,
-    joint_residuals,
-    joint_torques,
-    rank_and_condition,
-    stacked,
-    time_groups,
-    widened,
-)
+from tauhat.estimation.solution import Solution, block_moves, stacked, time_groups, widened
 
 FOLDS = 8  # blocks of time that are left out in turn
 _GRID = np.logspace(2.0, -3.0, 26)  # deviations that are tried, weakest pull first
-_NOMINAL: Mapping[str, str] = {"Ia": "rotor_inertia", "Fv": "viscous", "Fc": "coulomb"}
 _RANK = 1e-10  # smallest eigenvalue of the prior, with unit diagonal, that is not zero
 
 
@@ -130,17 +114,10 @@ class PulledLeastSquares(Estimator, ABC):
         white = fitted.variance * fitted.root @ fitted.root.T
         groups = time_groups(evidence)
         moves = block_moves(evidence, groups, weights, fitted.values, root=fitted.root) if len(groups) > 1 else None
-        rank, condition = rank_and_condition(evidence, weights)
-        return Solution(
-            values=fitted.values,
+        return diagnosed(
+            evidence,
+            Solved(fitted.values, weights, weighted.passes + 1),
             covariance=white if moves is None else widened(white, moves),
-            weights=weights,
-            joint_rms=joint_residuals(evidence, fitted.values),
-            torque_rms=joint_torques(evidence),
-            rank=rank,
-            condition=condition,
-            degrees=degrees_of_freedom(evidence),
-            passes=weighted.passes + 1,
             cause=_cause(chosen),
             advice=_advice(chosen),
         )
@@ -168,7 +145,7 @@ class PriorLeastSquares(PulledLeastSquares):
         sizes = _whole_torque(evidence, weights)
         if problem is None:
             return Pull(np.zeros(evidence.n_b), np.diag(sizes))
-        standard = nominal_parameters(problem.model)
+        standard = nominal_standard_parameters(problem.model)
         usual = _usual_sizes(problem.model, problem.base, standard, sizes)
         projection = problem.base.projection
         covariance = (projection * usual**2) @ projection.T
@@ -176,19 +153,6 @@ class PriorLeastSquares(PulledLeastSquares):
         axis, turn = np.linalg.eigh(covariance / np.outer(own, own))
         root = own[:, None] * turn * np.sqrt(np.maximum(axis, _RANK * axis[-1]))
         return Pull(projection @ standard, root)
-
-
-def nominal_parameters(model: TorqueModel) -> FloatArray:
-    """Return the standard parameters that the robot's description has, (n_p,); zero where it says nothing."""
-    robot = model.robot
-    values = []
-    for parameter in model.parameters:
-        if parameter.symbol in INERTIAL_SYMBOLS:
-            values.append(float(robot.inertia[parameter.joint, INERTIAL_SYMBOLS.index(parameter.symbol)]))
-        else:
-            name = _NOMINAL.get(parameter.symbol, "")
-            values.append(float(getattr(robot.joints[parameter.joint], name)) if name else 0.0)
-    return np.array(values)
 
 
 def chosen_deviation(evidence: Evidence, weights: FloatArray, pull: Pull) -> Choice:

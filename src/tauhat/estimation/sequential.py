@@ -26,7 +26,7 @@ from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Block, Evidence
 from tauhat.estimation.filters.outcome import Recursion
 from tauhat.estimation.friction import braking_parameters
-from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
+from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, diagnosed
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.segments import (
     Contrast,
@@ -37,7 +37,7 @@ from tauhat.estimation.segments import (
     reversals,
     tracks,
 )
-from tauhat.estimation.solution import Solution, joint_residuals, joint_torques, rank_and_condition, stacked
+from tauhat.estimation.solution import Solution, stacked
 
 _APART = 1e3  # scaled condition number of the segments above which friction parameters are not told apart
 _SMOOTH = 0.2  # part of a column that must be left about a reversal when its cubic is taken out
@@ -263,17 +263,11 @@ def _held(evidence: Evidence, own: IntArray, first: Solution, method: Estimator)
     across = carried @ first.covariance
     covariance[np.ix_(rest, own)], covariance[np.ix_(own, rest)] = across, across.T
     covariance[np.ix_(rest, rest)] = second.covariance + across @ carried.T
-    rank, condition = rank_and_condition(evidence, second.weights)
-    return Solution(
-        values=values,
+    return diagnosed(
+        evidence,
+        Solved(values, second.weights.copy(), first.passes + second.passes),
         covariance=covariance,
-        weights=second.weights.copy(),
-        joint_rms=joint_residuals(evidence, values),
-        torque_rms=joint_torques(evidence),
-        rank=rank,
-        condition=condition,
         degrees=min(first.degrees, second.degrees),
-        passes=first.passes + second.passes,
         cause="friction fitted to its segments, the rest with friction held",
     )
 

@@ -13,11 +13,11 @@ from tauhat.control.laws import Feedforward
 from tauhat.dynamics.forward import Masses, nominal_masses
 from tauhat.dynamics.model import Layout
 from tauhat.dynamics.motion import motion_from_rows
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.dynamics.rigid_body import gravity_torque
 from tauhat.dynamics.simulated_arm import Followed, Gains, Moved, SimulatedArm, follow, simulated_arm
 from tauhat.errors import ModelError, SimulationError
 from tauhat.estimation.closed_loop import ClosedLoop
-from tauhat.estimation.prior import nominal_parameters
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.rotor_load import standard_with_rotors
 from tauhat.estimation.rows import Rows, rows_of_stretches
@@ -130,7 +130,7 @@ class SimulatedRuns:
         if kind == "gravity":
             return gravity_torque(self.arm.model.robot, run.q_ref, inertia=masses.inertia)
         motion = motion_from_rows(run.q_ref, run.dq_ref, run.ddq_ref)
-        nominal = self.problem.base.projection @ nominal_parameters(self.problem.model)
+        nominal = self.problem.base.projection @ nominal_standard_parameters(self.problem.model)
         weights = self.standard(nominal)[self.layout.parameters]
         columns, _ = self.arm.model.columns(replace(motion, step=run.step), self.layout)
         joints = [self.layout.of_joint(j) for j in range(self.arm.model.robot.n_v)]

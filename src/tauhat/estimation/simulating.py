@@ -13,9 +13,8 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.blas import single_threaded
-from tauhat.dynamics.forward import nominal_masses
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.dynamics.simulated_arm import Moved
-from tauhat.dynamics.terms import INERTIAL_SYMBOLS
 from tauhat.errors import ModelError, SimulationError
 from tauhat.estimation.closed_loop import ClosedLoop
 from tauhat.estimation.evidence import Evidence, evidence_from_rows
@@ -127,7 +126,7 @@ class SimulationEstimator(Estimator):
         Least squares on badly filtered motion can be so far off that the passes lead to no robot at all.
         """
         try:
-            nominal = tried_in(runs, runs.problem.base.projection @ _nominal(runs.problem))
+            nominal = tried_in(runs, runs.problem.base.projection @ nominal_standard_parameters(runs.problem.model))
         except (ModelError, SimulationError):
             return None
         if np.array_equal(nominal.values, first.values):
@@ -181,7 +180,7 @@ class SimulationEstimator(Estimator):
         with suppress(ModelError, SimulationError):
             return tried_in(runs, _consistent(problem, problem.evidence, solved.weights))
         with suppress(ModelError, SimulationError):
-            return tried_in(runs, problem.base.projection @ _nominal(problem))
+            return tried_in(runs, problem.base.projection @ nominal_standard_parameters(problem.model))
         raise reason
 
     def _step(self, runs: SimulatedRuns, tried: Tried, found: Found) -> tuple[FloatArray, Tried]:
@@ -270,15 +269,3 @@ def torque_change(evidence: Evidence, change: FloatArray, values: FloatArray) ->
 def _consistent(problem: Problem, evidence: Evidence, weights: FloatArray) -> FloatArray:
     """Return the values of bodies of positive density that fit the evidence best, (n_b,)."""
     return consistent(evidence, problem.model, problem.base, weights=weights).values
-
-
-def _nominal(problem: Problem) -> FloatArray:
-    """Return the robot's nominal standard parameters, (n_p,), without friction."""
-    masses = nominal_masses(problem.model.robot)
-    standard = np.zeros(problem.model.n_p)
-    for index, parameter in enumerate(problem.model.parameters):
-        if parameter.symbol in INERTIAL_SYMBOLS:
-            standard[index] = masses.inertia[parameter.joint, INERTIAL_SYMBOLS.index(parameter.symbol)]
-        elif parameter.symbol == "Ia":
-            standard[index] = masses.rotor[parameter.joint]
-    return standard

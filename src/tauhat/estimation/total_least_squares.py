@@ -28,23 +28,9 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import Evidence
-from tauhat.estimation.least_squares import (
-    Estimator,
-    Solved,
-    WeightedLeastSquares,
-    check_rows,
-    degrees_of_freedom,
-)
+from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows, diagnosed
 from tauhat.estimation.problem import Problem
-from tauhat.estimation.solution import (
-    Solution,
-    joint_residuals,
-    joint_torques,
-    rank_and_condition,
-    stacked,
-    time_groups,
-    widened,
-)
+from tauhat.estimation.solution import Solution, stacked, time_groups, widened
 
 _NONE = 1e-8  # smallest singular value of the columns over that with the torque, less one, below which none exists
 _SHAKY = 2.0  # the same ratio below which errors are magnified rather than removed
@@ -124,18 +110,11 @@ class TotalLeastSquares(Estimator):
                 advice="the errors are as large as what the weakest parameters do: give richer motion, drop the "
                 "parameters that the motion does not show (--essential), or keep wls",
             )
-        rank, condition = rank_and_condition(evidence, weighted.weights)
         doubtful = found.ratio < _SHAKY
-        return Solution(
-            values=found.values,
+        return diagnosed(
+            evidence,
+            Solved(found.values, weighted.weights, weighted.passes + 1),
             covariance=total_covariance(evidence, weighted.weights, scales, found.values),
-            weights=weighted.weights,
-            joint_rms=joint_residuals(evidence, found.values),
-            torque_rms=joint_torques(evidence),
-            rank=rank,
-            condition=condition,
-            degrees=degrees_of_freedom(evidence),
-            passes=weighted.passes + 1,
             cause=f"solved; the columns' weakest direction stands {found.ratio:.3g} times above the errors",
             advice="that is too close: errors are magnified rather than removed, prefer wls" if doubtful else "",
         )

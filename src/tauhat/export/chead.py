@@ -8,6 +8,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.export.cfunctions import steady_widths
+from tauhat.export.comments import plain_letters
 from tauhat.export.friction import LAWS
 from tauhat.export.parameters import StandardParameters
 from tauhat.robots.joint import central_inertia
@@ -111,5 +112,5 @@ def _row(values: FloatArray) -> str:
 
 def _harmless(line: str) -> str:
     """Return text that cannot end a comment, start a trigraph or continue a line, whatever a robot is called."""
-    plain = "".join(letter if letter.isprintable() and letter.isascii() else "?" for letter in line)
+    plain = plain_letters(line)
     return plain.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").rstrip("\\")

@@ -18,10 +18,10 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import OutputError
 from tauhat.excitation.fourier import FourierSeries
+from tauhat.export.controller_arms import SIX_JOINTS, harmless_name, has_six_revolute_joints, kinds_of_joints
 from tauhat.files import write_text
 from tauhat.robots.robot import Robot
 
-_JOINTS = 6
 _DECIMALS = 15  # of coefficients [rad]: far finer than any encoder; URScript is not promised to know exponents
 _LOOKAHEAD = (0.03, 0.2)  # [s] what servoj accepts
 _GAIN = (100.0, 2000.0)
@@ -88,8 +88,10 @@ def urscript(robot: Robot, series: FourierSeries, *, settings: ServoSettings | N
         when the robot has not six revolute joints, or the motion is of another number of joints.
     """
     check_six_revolute(robot)
-    if series.n_v != _JOINTS:
-        raise OutputError("a motion of another robot", where=robot.name, expected=f"{_JOINTS} joints", got=series.n_v)
+    if series.n_v != SIX_JOINTS:
+        raise OutputError(
+            "a motion of another robot", where=robot.name, expected=f"{SIX_JOINTS} joints", got=series.n_v
+        )
     chosen = settings or ServoSettings()
     lines = [*_heading(robot, series, chosen), *_approach(series, chosen), *_loop(series, chosen), *_ending(chosen)]
     return "\n".join(["def excitation_motion():", *(f"  {line}" for line in lines), "end", ""])
@@ -103,17 +105,18 @@ def check_six_revolute(robot: Robot) -> None:
     OutputError
         when it has not six revolute joints.
     """
-    kinds = [joint.kind for joint in robot.joints]
-    if kinds != ["revolute"] * _JOINTS:
-        got = f"{kinds.count('revolute')} revolute, {kinds.count('prismatic')} prismatic"
+    if not has_six_revolute_joints(robot):
         raise OutputError(
-            "a UR program moves six revolute joints", where=robot.name, expected=f"{_JOINTS} revolute", got=got,
+            "a UR program moves six revolute joints",
+            where=robot.name,
+            expected=f"{SIX_JOINTS} revolute",
+            got=kinds_of_joints(robot),
             remedy="write the motion as .parquet or .csv, or lock joints with --lock",
-        )  # fmt: skip
+        )
 
 
 def _heading(robot: Robot, series: FourierSeries, settings: ServoSettings) -> Iterator[str]:
-    yield f"# Identification motion of {_harmless(robot.name)}: {series.n_h} harmonics of {series.period:g} s,"
+    yield f"# Identification motion of {harmless_name(robot)}: {series.n_h} harmonics of {series.period:g} s,"
     yield f"# run {settings.periods} times, from rest to rest. The way to the start pose is not checked for collisions."
 
 
@@ -125,7 +128,7 @@ def _approach(series: FourierSeries, settings: ServoSettings) -> Iterator[str]:
 
 def _loop(series: FourierSeries, settings: ServoSettings) -> Iterator[str]:
     """Yield the loop over all steps; `first` is the time within its period of the first step of a run."""
-    joints = range(1, _JOINTS + 1)
+    joints = range(1, SIX_JOINTS + 1)
     yield "local dt = get_steptime()"
     yield f"local period = {_number(series.period)}"
     yield f"local w = {_number(2.0 * np.pi / series.period)}"
@@ -149,13 +152,13 @@ def _loop(series: FourierSeries, settings: ServoSettings) -> Iterator[str]:
 
 def _targets(series: FourierSeries) -> Iterator[str]:
     n_h = series.n_h
-    for joint in range(_JOINTS):
+    for joint in range(SIX_JOINTS):
         yield f"q{joint + 1} = {_number(series.offset[joint])}"
     for k in range(1, n_h + 1):
         yield f"x = {k} * w * t"
         yield "s = sin(x)"
         yield "c = cos(x)"
-        for joint in range(_JOINTS):
+        for joint in range(SIX_JOINTS):
             sine, cosine = series.coefficients[joint, k - 1], series.coefficients[joint, n_h + k - 1]
             yield f"q{joint + 1} = q{joint + 1} + {_number(sine)} * s + {_number(cosine)} * c"
 
@@ -182,8 +185,3 @@ def _number(value: float) -> str:
     """Return a number without exponent; negative ones in brackets, so that they may stand after any operator."""
     text = f"{value:.{_DECIMALS}f}"
     return f"({text})" if value < 0.0 else text
-
-
-def _harmless(name: str) -> str:
-    """Return a name that cannot end a comment: names come from descriptions that others wrote."""
-    return "".join(letter if letter.isprintable() and letter.isascii() else "?" for letter in name)[:80]

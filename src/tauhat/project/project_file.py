@@ -66,6 +66,10 @@ def load_project(path: str | Path) -> Project:
         missing file, not TOML, unknown keys, values that mean nothing.
     """
     place = project_path(path).absolute()  # what is inside the folder is then told from what is not
+    if not place.exists():
+        folder = place.parent if place.name == NAME else place.with_suffix("")
+        remedy = f"tauhat run --new ROBOT {folder} makes one"
+        raise ProjectError("no such project", where=place, remedy=remedy)
     text, where = read_text(place, error=ProjectError, largest=_LARGEST_FILE), str(place)
     try:
         data = tomllib.loads(text)

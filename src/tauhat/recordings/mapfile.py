@@ -70,6 +70,18 @@ def parse_map(text: str, *, where: str = "map") -> LogMap:
         ) from error
 
 
+def signal_from_table(kind: str, table: dict[str, Any]) -> SignalMap:
+    """Return what the section `[kind]` of a map says.
+
+    Raises
+    ------
+    MapError
+        unknown keys, or values that mean nothing.
+    """
+    _check_keys(kind, table)
+    return _signal(kind, table)
+
+
 def find_map(log: str | Path) -> Path | None:
     """Return the map beside a log: `run.map.toml` for `run.csv.gz`, else `map.toml` of the folder, else None."""
     path = Path(log)
@@ -121,10 +133,7 @@ def _build(data: dict[str, Any], where: str) -> LogMap:
             raise MapError(f"unknown section [{section}]", where=where, expected=", ".join(_KEYS))
         if not isinstance(table, dict):
             raise MapError("not a section", where=f"[{section}]", expected="a table of keys", got=_shown(table))
-        unknown = sorted(set(table) - set(_KEYS[section]))
-        if unknown:
-            legal = ", ".join(_KEYS[section])
-            raise MapError(f"unknown key {', '.join(unknown)}", where=f"[{section}]", expected=f"one of {legal}")
+        _check_keys(section, table)
     for section in ("time", "position"):
         if section not in data:
             raise MapError(f"section [{section}] is missing", where=where, remedy="a map needs [time] and [position]")
@@ -140,6 +149,13 @@ def _build(data: dict[str, Any], where: str) -> LogMap:
         coupling=Coupling(**matrices),
         source=where,
     )
+
+
+def _check_keys(section: str, table: Mapping[str, Any]) -> None:
+    unknown = sorted(set(table) - set(_KEYS[section]))
+    if unknown:
+        legal = ", ".join(_KEYS[section])
+        raise MapError(f"unknown key {', '.join(unknown)}", where=f"[{section}]", expected=f"one of {legal}")
 
 
 def _time(table: dict[str, Any]) -> TimeMap:

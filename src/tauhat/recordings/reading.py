@@ -92,6 +92,23 @@ def read_chunks(
     return _chunks(*_opened(path, map, rows), chunk)
 
 
+def map_of(path: str | Path, given: LogMap | str | Path | None = None) -> LogMap:
+    """Return the map that a log is read with: the given one, the one beside it, or what its column names say.
+
+    Raises
+    ------
+    RecordingError, MapError
+        as `read_recording`.
+    """
+    place = existing_file(path, error=RecordingError)
+    chosen = given if given is not None else find_map(place)
+    if given is None and chosen == place.with_name(FOLDER_MAP) and open_table(place).joint_names():
+        chosen = None  # written by tauhat, not one of the logs that the folder's map is for
+    if chosen is None:
+        return recognise(open_table(place))
+    return chosen if isinstance(chosen, LogMap) else load_map(chosen)
+
+
 def _chunks(bound: BoundLog, window: RowWindow, chunk: int) -> Iterator[Recording]:
     digest = sha256_of(bound.files)
     last: Recording | None = None
@@ -135,16 +152,9 @@ def _joined(last: Recording | None, log: Log) -> Log:
 
 
 def _opened(path: str | Path, log_map: LogMap | str | Path | None, rows: Rows | None) -> tuple[BoundLog, RowWindow]:
-    place = existing_file(path, error=RecordingError)
-    chosen = log_map if log_map is not None else find_map(place)
-    if log_map is None and chosen == place.with_name(FOLDER_MAP) and open_table(place).joint_names():
-        chosen = None  # written by tauhat, not one of the logs that the folder's map is for
-    if chosen is None:
-        chosen = recognise(open_table(place))
-    elif not isinstance(chosen, LogMap):
-        chosen = load_map(chosen)
+    chosen = map_of(path, log_map)
     window = chosen.rows if rows is None else RowWindow(start=rows[0], stop=rows[1])
-    return bind(place, chosen), window
+    return bind(existing_file(path, error=RecordingError), chosen), window
 
 
 def _usable(bound: BoundLog, window: RowWindow, first: int, count: int) -> tuple[int, int]:

@@ -19,7 +19,9 @@ _STEMS = {
     "torque": ("tau_", "tau"),
     "temperature": ("temperature_", "temperature"),
 }
-_TORQUE_LIKE = re.compile("tau|torq|effort|cur|amp|moment|force")
+_CURRENT_LIKE = re.compile('^"i[_{]|cur|amp')
+_TORQUE_LIKE = re.compile(f"{_CURRENT_LIKE.pattern}|tau|torq|effort|moment|force")
+_NOT_MEASURED_HERE = re.compile("target|desired|command|goal|tcp|tool")  # what was wished, or is not of the joints
 _SPEED_LIKE = re.compile("dq|qd|vel|speed|omega")
 _WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
@@ -59,11 +61,16 @@ def skeleton(table: Table) -> str:
     clock, others = _guesses(table)
     lines = ["[time]", f"column = {clock}", 'unit = "s"  # or ms, us, ns']
     for kind, columns in others.items():
-        unit = {"torque": '"Nm"  # or A, V, count with gain = [...]'}.get(
-            kind, '"rad"  # or deg, count with scale = [...]'
-        )
-        lines += ["", f"[{kind}]", f"columns = {columns}", f"unit = {unit}"]
+        lines += ["", f"[{kind}]", f"columns = {columns}", f"unit = {_unit(kind, columns)}"]
     return "\n".join(lines) + "\n"
+
+
+def _unit(kind: str, columns: str) -> str:
+    """Return the likely unit of columns, and what it may be instead."""
+    if kind == "torque" and _CURRENT_LIKE.search(columns.lower()):
+        return '"A"  # or Nm, V, count\ngain = 1.0  # put in: Nm at the joint per ampere'
+    units = {"torque": '"Nm"  # or A, V, count with gain = [...]', "velocity": '"rad/s"  # or deg/s'}
+    return units.get(kind, '"rad"  # or deg, count with scale = [...]')
 
 
 def _plain(table: Table, kind: str) -> SignalMap | None:
@@ -102,6 +109,7 @@ def _guesses(table: Table) -> tuple[str, dict[str, str]]:
 
 def _placed(found: list[str]) -> dict[str, str]:
     """Return which run of columns is what, by name where the names tell, else in their order."""
+    found = [text for text in found if not _NOT_MEASURED_HERE.search(text.lower())] or found
     torque = next((text for text in found if _TORQUE_LIKE.search(text.lower())), None)
     speed = next((text for text in found if text != torque and _SPEED_LIKE.search(text.lower())), None)
     if torque is None and speed is None:

@@ -40,6 +40,8 @@ def _open_by_content(path: Path) -> Table:
         raise RecordingError("cannot be read", where=path, got=error.strerror or error) from error
     if not head:
         raise RecordingError("empty file", where=path)
+    if head.lstrip()[:1] == b"{":
+        raise RecordingError("JSON, not a log", where=path, expected="CSV, Parquet, NPZ or MAT")
     if head.startswith(PARQUET_MAGIC):
         return ParquetTable(path)
     if head.startswith(NPZ_MAGIC):

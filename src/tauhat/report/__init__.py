@@ -2,6 +2,7 @@
 
 from tauhat.report.page import write_motion_report, write_report
 from tauhat.report.study_page import write_study
+from tauhat.report.task_page import write_task_report
 from tauhat.report.thinning import thinned, thinned_cloud
 from tauhat.report.tracking_page import write_tracking_report
 
@@ -11,5 +12,6 @@ __all__ = [
     "write_motion_report",
     "write_report",
     "write_study",
+    "write_task_report",
     "write_tracking_report",
 ]

@@ -64,8 +64,7 @@ def write_report(
         moved = motion_case(estimate.robot, motion, counted=information(with_exact_sign(estimate.model)))
         sections += [section(moved) for section in MOTION_SECTIONS]
     heading = title or f"{estimate.robot.name}: identified torque model"
-    write_text(path, page_of(sections, title=heading, version=estimate.version))
-    return Path(path)
+    return write_page(path, sections, title=heading, version=estimate.version)
 
 
 def write_motion_report(
@@ -93,14 +92,12 @@ def write_motion_report(
         when the file cannot be written.
     """
     require_libraries()
-    from tauhat import __version__
     from tauhat.report.motion_case import motion_case
     from tauhat.report.sections import MOTION_SECTIONS
 
     case = motion_case(robot, trajectory, counted=counted, limits=limits, margins=margins)
     sections = [section(case) for section in MOTION_SECTIONS]
-    write_text(path, page_of(sections, title=f"{robot.name}: designed motion", version=__version__))
-    return Path(path)
+    return write_page(path, sections, title=f"{robot.name}: designed motion")
 
 
 def write_comparison(path: str | Path, comparison: Comparison, *, title: str) -> Path:
@@ -114,11 +111,9 @@ def write_comparison(path: str | Path, comparison: Comparison, *, title: str) ->
         when the file cannot be written.
     """
     require_libraries()
-    from tauhat import __version__
     from tauhat.report.sections.comparison import comparison as section
 
-    write_text(path, page_of([section(comparison)], title=title, version=__version__))
-    return Path(path)
+    return write_page(path, [section(comparison)], title=title)
 
 
 def _by_log(findings: Findings | None) -> tuple[tuple[str, tuple[Finding, ...]], ...] | None:
@@ -138,8 +133,25 @@ def require_libraries() -> None:
             raise MissingExtraError(library, "report") from error
 
 
-def page_of(sections: Sequence[Section], *, title: str, version: str) -> str:
-    """Return the whole page: sections, their drawings' data, styles and scripts."""
+def write_page(path: str | Path, sections: Sequence[Section], *, title: str, version: str | None = None) -> Path:
+    """Write a page of sections, their drawings' data, styles and scripts, whole or not at all; return its path.
+
+    Parameters
+    ----------
+    version : of the library that made what is shown; this one by default
+
+    Raises
+    ------
+    OutputError
+        when the file cannot be written.
+    """
+    from tauhat import __version__
+
+    write_text(path, _page(sections, title=title, version=version or __version__))
+    return Path(path)
+
+
+def _page(sections: Sequence[Section], *, title: str, version: str) -> str:
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
 

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 from tauhat.arrays import FloatArray
 from tauhat.report.case import Plot
 from tauhat.report.figures import LINE_COLOURS, finished, plain
+from tauhat.report.marks import marked
 from tauhat.studies.study import Chart, Series
 
 _BAND_OPACITY = 0.18
@@ -17,7 +18,6 @@ _HEIGHT = 420
 _MOST_MARKED = 60  # points of a line that are marked
 _WIDTH_PER_VALUE = 7  # [px] of a value over a name
 _MOST_TICKS = 12  # places that are all marked on a logarithmic axis
-_ONE_TWO_FIVE = "D2"  # Plotly's word for ticks at 1, 2, 5, 10
 _HOVER = "%{x}: %{y:.3g}"
 
 
@@ -49,7 +49,8 @@ def _arrange(figure: Any, chart: Chart) -> None:
     figure.update_xaxes(title_text=plain(chart.x_title), type="log" if "x" in chart.logarithmic else None)
     figure.update_yaxes(title_text=plain(chart.y_title), type="log" if "y" in chart.logarithmic else None)
     if "y" in chart.logarithmic:
-        figure.update_yaxes(dtick=_ONE_TWO_FIVE)
+        values = [value for series in chart.series for value in (*series.y, *series.low, *series.high)]
+        figure.update_yaxes(**marked(values))
     places = sorted({float(place) for series in chart.series for place in series.x if not isinstance(place, str)})
     if "x" in chart.logarithmic and len(places) <= _MOST_TICKS:
         figure.update_xaxes(tickvals=places, ticktext=[f"{place:g}" for place in places])

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from tauhat.files import write_text
 from tauhat.report.formatting import number
-from tauhat.report.page import page_of, require_libraries
+from tauhat.report.page import require_libraries, write_page
 from tauhat.studies.study import Cell, Chapter, StudyResult, Table
 
 if TYPE_CHECKING:
     from tauhat.report.case import Plot, Section
 
+_ROUNDING = 1e-13  # of the largest number in a column
 _FOLDED_FROM = 31  # rows of a table that is folded until a reader asks for it
 
 
@@ -52,11 +53,8 @@ def write_study(path: str | Path, result: StudyResult) -> Path:
         when the file cannot be written.
     """
     require_libraries()
-    from tauhat import __version__
-
     sections = [_summary(result), *(_section(chapter, index) for index, chapter in enumerate(result.chapters))]
-    write_text(path, page_of(sections, title=result.title, version=__version__))
-    return Path(path)
+    return write_page(path, sections, title=result.title)
 
 
 def _summary(result: StudyResult) -> Section:
@@ -95,15 +93,35 @@ def _section(chapter: Chapter, index: int) -> Section:
 
 def shown_table(table: Table) -> ShownTable:
     """Return the table with its cells as text; columns with a number in them stand to the right."""
-    rows = tuple(tuple(ShownCell(cell_text(cell), _is_number(cell)) for cell in row) for row in table.rows)
+    nothing = [_nothing(row[column] for row in table.rows) for column in range(len(table.header))]
+    rows = tuple(
+        tuple(
+            ShownCell(cell_text(cell, nothing=least), _is_number(cell))
+            for cell, least in zip(row, nothing, strict=True)
+        )
+        for row in table.rows
+    )
     counted = [any(row[column].is_number for row in rows) for column in range(len(table.header))]
     header = tuple(ShownCell(text, right) for text, right in zip(table.header, counted, strict=True))
     return ShownTable(table.title, header, rows, table.note, len(rows) >= _FOLDED_FROM)
 
 
-def cell_text(cell: Cell) -> str:
-    """Return a cell as text: whole numbers whole, others to three digits, a dash where there is none."""
-    return number(cell) if isinstance(cell, float) else str(cell)
+def cell_text(cell: Cell, *, nothing: float = 0.0) -> str:
+    """Return a cell as text: whole numbers whole, others to three digits, a dash where there is none.
+
+    Parameters
+    ----------
+    nothing : size up to which a number is no more than rounding, and shown as zero
+    """
+    if not isinstance(cell, float):
+        return str(cell)
+    return number(0.0 if abs(cell) <= nothing else cell)
+
+
+def _nothing(column: Iterable[Cell]) -> float:
+    """Return the size that is rounding beside the largest number of a column."""
+    sizes = [abs(cell) for cell in column if isinstance(cell, float) and math.isfinite(cell)]
+    return _ROUNDING * max(sizes, default=0.0)
 
 
 def _is_number(cell: Cell) -> bool:

@@ -12,6 +12,7 @@ from plotly.subplots import make_subplots
 from tauhat.arrays import FloatArray
 from tauhat.report.case import Plot, clock_start
 from tauhat.report.figures import LINE_COLOURS, MEASURED, compact, finished, plain
+from tauhat.report.marks import marked
 from tauhat.report.thinning import MOST_POINTS, thinned
 from tauhat.verification.motion_forward import ForwardMotion, ForwardRun
 from tauhat.verification.motion_tracking import TrackingComparison, TrackingRun
@@ -22,7 +23,6 @@ COLOURS = {
     "identified": LINE_COLOURS[2],
     "learnt": LINE_COLOURS[4],
 }
-_ONE_TWO_FIVE = "D2"  # Plotly's word for ticks at 1, 2, 5, 10
 _WIDTH_PER_BAR = 14  # [px]
 
 
@@ -48,7 +48,8 @@ def tracking_bars(result: TrackingComparison, *, key: str) -> Plot:
             )
         )  # fmt: skip
     figure.update_layout(barmode="group")
-    figure.update_yaxes(title_text=f"rms error [{_thousandths(result.units)}]", type="log", dtick=_ONE_TWO_FIVE)
+    sizes = [1e3 * run.rms for run in done]
+    figure.update_yaxes(title_text=f"rms error [{_thousandths(result.units)}]", type="log", **marked(sizes))
     width = _WIDTH_PER_BAR * len(done) * len(joints)
     return finished(figure, key=key, caption="Tracking error of every joint", height=400, width=width)
 

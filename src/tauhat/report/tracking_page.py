@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tauhat.errors import ModelError
-from tauhat.files import write_text
-from tauhat.report.page import page_of, require_libraries
+from tauhat.report.page import require_libraries, write_page
 from tauhat.verification.motion_forward import ForwardMotion
 from tauhat.verification.motion_tracking import TrackingComparison
 
@@ -37,10 +36,8 @@ def write_tracking_report(
     if tracking is None and forward is None:
         raise ModelError("nothing to show", expected="a tracking comparison, or a recording done again")
     require_libraries()
-    from tauhat import __version__
     from tauhat.report.sections import tracking as chapters
 
     sections = [] if tracking is None else [chapters.tracking(tracking)]
     sections += [] if forward is None else [chapters.forward(forward)]
-    write_text(path, page_of(sections, title=title, version=__version__))
-    return Path(path)
+    return write_page(path, sections, title=title)

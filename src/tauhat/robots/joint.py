@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -103,10 +103,6 @@ class Joint:
     def effort_unit(self) -> str:
         """Unit of the joint's torque: Nm or N."""
         return "Nm" if self.kind == "revolute" else "N"
-
-    def with_parent(self, parent: int) -> Joint:
-        """Return the same joint hung on another parent index."""
-        return replace(self, parent=parent)
 
 
 def inertia_at_origin(*, mass: float, com: FloatArray, inertia_at_com: FloatArray) -> FloatArray:

@@ -33,7 +33,7 @@ def joint_row(fields: TomlFields, key: str, robot: Robot, default: float | None 
     Raises
     ------
     RobotError, SimulationError
-        when it is missing, not a number, or of a joint that is not there.
+        when it is missing, not a number, of a joint that is not there, or a list of another length.
     """
     value = fields.table.get(key)
     if isinstance(value, Mapping):
@@ -46,6 +46,9 @@ def joint_row(fields: TomlFields, key: str, robot: Robot, default: float | None 
             raise SimulationError(f"{key} needs a value for every joint", where=table.where, expected=missing)
         return row
     if isinstance(value, list):
+        if len(value) != robot.n_v:
+            wanted = f"1, or {robot.n_v} ({', '.join(robot.joint_names)})"
+            raise SimulationError(f"wrong number of {key}", where=fields.where, expected=wanted, got=len(value))
         return np.array(fields.row(key, robot.n_v))
     return np.full(robot.n_v, fields.number(key, default))
 

@@ -69,7 +69,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields as fields_of
 from dataclasses import replace
 from pathlib import Path
@@ -78,7 +78,6 @@ from typing import Any
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.control.laws import PD, PID, PDFeedforward, PDGravity, TrackingLaw
 from tauhat.errors import SimulationError, TauhatError
 from tauhat.excitation.limits import load_limits
 from tauhat.excitation.motion_file import motion_for
@@ -88,6 +87,7 @@ from tauhat.robots.robot import Robot
 from tauhat.robots.toml_fields import TomlFields
 from tauhat.simulation.attached import AttachedBody
 from tauhat.simulation.closed_loop import Encoder
+from tauhat.simulation.controller_fields import CONTROLLER_KEYS, tracking_law
 from tauhat.simulation.elasticity import ElasticJoints
 from tauhat.simulation.experiment import ExperimentSettings
 from tauhat.simulation.experiment_fields import joint_of, joint_row, optional_row, whole_number
@@ -98,7 +98,6 @@ from tauhat.simulation.sensors import Ripple, SensorErrors, sensor_preset
 _LARGEST_FILE = 2**20  # [bytes]
 _SLOWEST_CONTROL = 2000.0  # [Hz]
 _SECTIONS = ("robot", "seed", "robot_seed", "locked", "truth", "motion", "controller", "encoder", "sensors", "log")
-_LAWS: Mapping[str, type[TrackingLaw]] = {law.key: law for law in (PD, PDGravity, PDFeedforward, PID)}
 _SENSORS = tuple(item.name for item in fields_of(SensorErrors))
 _SPRING: Mapping[str, float | None] = {"stiffness": None, "damping": 0.0, "gap": 0.0}
 _WORDS = ("velocity", "torque_side", "stamps")
@@ -114,7 +113,7 @@ def is_experiment(path: str | Path) -> bool:
         data = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return False
-    return isinstance(data.get("robot"), str) and "joints" not in data
+    return "robot" in data and "joints" not in data
 
 
 def load_experiment(path: str | Path) -> PlannedExperiment:
@@ -140,6 +139,8 @@ def load_experiment(path: str | Path) -> PlannedExperiment:
 
 
 def _experiment(top: TomlFields, folder: Path) -> PlannedExperiment:
+    if isinstance(top.table.get("robot"), dict):
+        raise SimulationError("a project, not an experiment", where=top.where, remedy="go its way with tauhat run")
     top.refuse_unknown(_SECTIONS)
     name = top.text("robot")
     described_by = name if name in builtin_names() else str(folder / name)
@@ -232,7 +233,7 @@ def _motion(fields: TomlFields, robot: Robot, folder: Path) -> MotionPlan:
 
 def _settings(top: TomlFields, robot: Robot, log: TomlFields) -> ExperimentSettings:
     control, encoder = top.subtable("controller"), top.subtable("encoder")
-    control.refuse_unknown(("kind", "bandwidth", "rate", "delay", "kp", "kd", "ki", "torque_limit"))
+    control.refuse_unknown(CONTROLLER_KEYS)
     encoder.refuse_unknown(("side", "step", "velocity"))
     rate = log.number("rate", 500.0)
     if rate <= 0.0:
@@ -249,26 +250,11 @@ def _settings(top: TomlFields, robot: Robot, log: TomlFields) -> ExperimentSetti
         sample_rate=rate,
         settle=log.number("settle", 1.0),
         bandwidth=control.number("bandwidth", 15.0),
-        controller=_controller(control, robot),
+        controller=tracking_law(control, robot),
         control_delay=control.number("delay", 0.0),
         encoder=Encoder(side=side, step=joint_row(encoder, "step", robot, 0.0), velocity=velocity),
         sensors=_sensors(top.subtable("sensors"), robot),
     )
-
-
-def _controller(fields: TomlFields, robot: Robot) -> TrackingLaw | None:
-    kind = fields.choice("kind", ("tuned", *_LAWS), "tuned")
-    gains = ("kp", "kd", "ki") if kind == "pid" else () if kind == "tuned" else ("kp", "kd")
-    strange = [key for key in ("kp", "kd", "ki", "torque_limit") if key in fields.table and key not in gains]
-    strange = [key for key in strange if kind == "tuned" or key != "torque_limit"]
-    if strange:
-        raise SimulationError(f"a {kind} controller has no {strange[0]}", where=fields.where)
-    if kind == "tuned":
-        return None
-    limit = optional_row(fields, "torque_limit", robot)
-    make: Callable[..., TrackingLaw] = _LAWS[kind]
-    values = {key: joint_row(fields, key, robot) for key in gains}
-    return make(**values, torque_limit=robot.effort_limit if limit is None else limit)
 
 
 def _sensors(fields: TomlFields, robot: Robot) -> SensorErrors:

@@ -94,6 +94,14 @@ class TrueParameters:
             inertia[body.joint] += body.parameters
         return np.asarray(read_only(inertia))
 
+    def behind_gear(self) -> TrueParameters:
+        """Return what a torque sensor behind the gear shows: links and their laws, no rotor, friction or offset."""
+        none = np.zeros(self.n_v)
+        laws = tuple(law for law in self.laws if law.side == "link")
+        return TrueParameters(
+            inertia=self.inertia, rotor=none, viscous=none, coulomb=none, offset=none, laws=laws, attached=self.attached
+        )
+
     def value(self, symbol: str, joint: int) -> float:
         """Return the true value of a standard parameter; zero where the plant has nothing of the kind.
 

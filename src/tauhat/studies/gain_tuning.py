@@ -28,6 +28,7 @@ from tauhat.blas import single_threaded
 from tauhat.control.controller import Controller, TrackingController
 from tauhat.control.laws import PID, TrackingLaw
 from tauhat.errors import MissingExtraError, ModelError, SimulationError
+from tauhat.plain_data import without_infinities
 from tauhat.studies.gain_rehearsal import Judged, Price, Rehearsal, joint_gains
 
 _ALL = "all joints"
@@ -104,12 +105,12 @@ class TunedGains:
             "tuned": _gains(self.tuned),
             "trials": int(self.costs.size),
             "unstable": self.unstable,
-            "costs": [float(cost) if np.isfinite(cost) else None for cost in self.costs],
-            "error_gone": _finite(_gone(self.before, self.after)),
-            "error_gone_unseen": _finite(self.improvement),
+            "costs": without_infinities(self.costs.tolist()),
+            "error_gone": without_infinities(_gone(self.before, self.after)),
+            "error_gone_unseen": without_infinities(self.improvement),
             "unseen_rms": {
-                "by_hand": [_finite(value) for value in self.unseen_before.error],
-                "tuned": [_finite(value) for value in self.unseen_after.error],
+                "by_hand": without_infinities(self.unseen_before.error.tolist()),
+                "tuned": without_infinities(self.unseen_after.error.tolist()),
             },
             "unseen_failure": self.unseen_after.failure,
         }
@@ -255,7 +256,3 @@ def _gone(before: Judged, after: Judged) -> float:
 
 def _gains(law: TrackingLaw) -> dict[str, list[float]]:
     return {"kp": law.kp.tolist(), "kd": law.kd.tolist(), "ki": law.integral_gain.tolist()}
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

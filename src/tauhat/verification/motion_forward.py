@@ -22,15 +22,16 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, read_only
 from tauhat.blas import single_threaded
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.dynamics.simulated_arm import Followed, Gains, Moved, follow
 from tauhat.errors import ModelError, SimulationError
 from tauhat.estimation.closed_loop import ClosedLoop
 from tauhat.estimation.estimate import Estimate
 from tauhat.estimation.evidence import collect_all
-from tauhat.estimation.prior import nominal_parameters
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.rows import check_joints
 from tauhat.estimation.simulated_runs import Run, SimulatedRuns, simulated_runs
+from tauhat.plain_data import without_infinities
 from tauhat.recordings.filters import filtered
 from tauhat.recordings.recording import Recording
 
@@ -64,7 +65,7 @@ class ForwardRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures, without the series, as plain data."""
-        figures = {name: _plain(getattr(self, name)) for name in ("rms", "worst", "torque_rms")}
+        figures = {name: without_infinities(getattr(self, name).tolist()) for name in ("rms", "worst", "torque_rms")}
         return {"model": self.model, "way": self.way, **figures, "failure": self.failure}
 
 
@@ -149,7 +150,7 @@ def forward_motion(
     following, driving = simulated_runs(problem, loop), simulated_runs(problem, free)
     models = {"identified": estimate.values}
     if estimate.robot.has_inertia:
-        models["nominal"] = estimate.base.projection @ nominal_parameters(estimate.model)
+        models["nominal"] = estimate.base.projection @ nominal_standard_parameters(estimate.model)
     run = following.runs[0]
     held = _tether(driving, models.values())
     shown = _trusted(run)
@@ -234,7 +235,3 @@ def _trusted(run: Run, *, stride: int = 1) -> Any:
     """Return which of every so many samples lie in the rows that are trusted."""
     t = run.t[::stride]
     return (t >= run.begin) & (t <= run.end)
-
-
-def _plain(values: FloatArray) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]

@@ -22,12 +22,13 @@ from tauhat.control.model_torque import nominal_torque
 from tauhat.control.tracking_regressor import tracking_regressor
 from tauhat.dynamics.base import base_parameters
 from tauhat.dynamics.model import torque_model
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.dynamics.terms import Coulomb
 from tauhat.errors import ModelError, SimulationError
 from tauhat.estimation.estimate import Estimate
 from tauhat.estimation.identified_torque import identified_torque
-from tauhat.estimation.prior import nominal_parameters
 from tauhat.excitation.trajectory import MotionSamples, Trajectory
+from tauhat.plain_data import without_infinities
 from tauhat.robots.robot import Robot
 from tauhat.simulation.experiment import ExperimentSettings, simulate
 from tauhat.simulation.gains import tracking_gains
@@ -73,10 +74,7 @@ class TrackingRun:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures, without the series, as plain data."""
-        figures = {
-            name: [float(value) if np.isfinite(value) else None for value in getattr(self, name)]
-            for name in ("rms", "worst", "effort")
-        }
+        figures = {name: without_infinities(getattr(self, name).tolist()) for name in ("rms", "worst", "effort")}
         return {"controller": self.name, "model": self.knows, **figures, "failure": self.failure}
 
 
@@ -227,7 +225,7 @@ def _adaptive(robot: Robot, samples: MotionSamples, law: TrackingLaw) -> Adaptiv
     moving = (np.array(samples.q), np.array(samples.dq), np.array(samples.ddq))
     return AdaptiveTracking(
         regressor=regressor,
-        values=base.projection @ nominal_parameters(model),
+        values=base.projection @ nominal_standard_parameters(model),
         gain=law.kd,
         stiffness=law.kp / law.kd,
         learning=learning_along(regressor, moving, gain=law.kd, time=_LEARNING_TIME),

@@ -7,13 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from tauhat.arrays import FloatArray, IntArray
+from tauhat.arrays import FloatArray
 from tauhat.dynamics.motion import Motion
-from tauhat.dynamics.terms import Parameter, Term
 from tauhat.dynamics.terms.load import load_on_joints
 from tauhat.dynamics.terms.presliding import dahl_states
 from tauhat.robots.robot import Robot
-from tauhat.verification.series import probe_parameters, probe_support
+from tauhat.verification.series import ProbeTerm
 
 WIDTH = 0.01  # of the smooth sign, in parts of the top speed
 STRIBECK_SPEEDS = (0.02, 0.06, 0.2)  # in parts of the top speed
@@ -28,7 +27,7 @@ SINGLE = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Probes(Term):
+class Probes(ProbeTerm):
     """What effects of position, speed, direction, acceleration and load would add to each joint's torque.
 
     tops : (n_v,) top speed of each joint [rad/s or m/s]
@@ -46,14 +45,6 @@ class Probes(Term):
     def width(self) -> int:
         """Columns of each joint."""
         return len(SINGLE) + 2 * len(self.orders[0])
-
-    def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
-        """Return one parameter a column."""
-        return probe_parameters(robot, self.width)
-
-    def support(self, robot: Robot) -> tuple[IntArray, ...]:
-        """Return each joint's own columns."""
-        return probe_support(robot, self.width)
 
     def columns(
         self, robot: Robot, motion: Motion, state: FloatArray | None

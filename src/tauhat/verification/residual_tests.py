@@ -22,6 +22,7 @@ from tauhat.estimation.estimate import Estimate
 from tauhat.recordings.choice import top_speeds
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
+from tauhat.robots.naming import advice_on_name
 from tauhat.verification.effects import JointView, candidates
 from tauhat.verification.fold_gains import passing
 from tauhat.verification.joint_search import Effect, JointCase, Search, changes, named, no_columns
@@ -38,6 +39,7 @@ from tauhat.verification.whiteness import Whiteness, whiteness
 
 FALSE_ALARMS = 0.05  # share of what is named that may be false; of logs of a right model on which anything is
 _FEWEST_ROWS = 200
+_FEWEST_INDEPENDENT = 30  # rows of a joint below which only effects that make most of its residual can be told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +86,18 @@ class LogResiduals:
         found = [(joint.name, effect) for joint in self.joints for effect in (*joint.changed, *joint.missing)]
         return tuple(sorted(found, key=lambda pair: -pair[1].share))
 
+    @property
+    def silence(self) -> str:
+        """What it means that nothing was named: that there is nothing, or that too little can be told."""
+        few = [joint.name for joint in self.joints if joint.whiteness.effective < _FEWEST_INDEPENDENT]
+        if not few:
+            return "no effect of the catalogue can be told in the residuals."
+        where = "every joint" if len(few) == len(self.joints) else ", ".join(few)
+        return (
+            f"no effect of the catalogue can be told in the residuals, which on {where} are worth fewer than "
+            f"{_FEWEST_INDEPENDENT} independent rows: effects may be there. A longer recording tells more."
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
         return {"log": self.log, "false_alarms": FALSE_ALARMS, "joints": [joint.to_dict() for joint in self.joints]}
@@ -121,11 +135,11 @@ def residual_tests(
 
 def _orders(estimate: Estimate, ratios: Mapping[str, float]) -> tuple[tuple[float, ...], ...]:
     names = estimate.robot.joint_names
-    unknown = sorted(set(ratios) - set(names))
-    if unknown or any(not 0.0 < abs(ratio) < np.inf for ratio in ratios.values()):
-        raise ModelError(
-            "gear ratios", expected=f"a number for some of {', '.join(names)}", got=dict(ratios), remedy="see --gear"
-        )
+    for name, ratio in ratios.items():
+        if name not in names:
+            raise ModelError("gear ratio of an unknown joint", got=name, remedy=advice_on_name(name, names))
+        if not 0.0 < abs(ratio) < np.inf:
+            raise ModelError("gear ratio", where=name, expected="motor turns a turn of the joint, not 0", got=ratio)
     if not ratios:
         return tuple(ORDERS for _ in names)
     turns = [abs(ratios[name]) if name in ratios else 0.5 for name in names]  # the half: orders that are there already

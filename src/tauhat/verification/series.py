@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
@@ -45,19 +46,37 @@ class PredictedRows(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kinematics(Term):
-    """Position and acceleration as columns, so that they pass the filter that the torque passes; nothing to fit."""
+class ProbeTerm(Term):
+    """Columns that are looked at beside a model's own, equally many on every joint; nothing to fit."""
 
-    key: ClassVar[str] = "kinematics"
-    width: ClassVar[int] = 2
+    @property
+    @abstractmethod
+    def width(self) -> int:
+        """Columns of each joint."""
 
     def parameters(self, robot: Robot) -> tuple[Parameter, ...]:
         """Return one parameter a column."""
-        return probe_parameters(robot, self.width)
+        return tuple(
+            Parameter(symbol=f"probe {column}", joint=joint, unit="")
+            for joint in range(robot.n_v)
+            for column in range(self.width)
+        )
 
     def support(self, robot: Robot) -> tuple[IntArray, ...]:
         """Return each joint's own columns."""
-        return probe_support(robot, self.width)
+        return tuple(np.arange(self.width) + self.width * joint for joint in range(robot.n_v))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kinematics(ProbeTerm):
+    """Position and acceleration as columns, so that they pass the filter that the torque passes."""
+
+    key: ClassVar[str] = "kinematics"
+
+    @property
+    def width(self) -> int:
+        """Position and acceleration."""
+        return 2
 
     def columns(
         self, robot: Robot, motion: Motion, state: FloatArray | None
@@ -65,20 +84,6 @@ class Kinematics(Term):
         """Return q and ddq; pointwise."""
         pairs = [(motion.q[joint], motion.ddq[joint]) for joint in range(robot.n_v)]
         return tuple(np.stack(pair) for pair in pairs), state
-
-
-def probe_parameters(robot: Robot, width: int) -> tuple[Parameter, ...]:
-    """Return the parameters of a term with `width` columns on every joint."""
-    return tuple(
-        Parameter(symbol=f"probe {column}", joint=joint, unit="")
-        for joint in range(robot.n_v)
-        for column in range(width)
-    )
-
-
-def probe_support(robot: Robot, width: int) -> tuple[IntArray, ...]:
-    """Return each joint's own parameters of such a term."""
-    return tuple(np.arange(width) + width * joint for joint in range(robot.n_v))
 
 
 def predicted_rows(

@@ -234,7 +234,7 @@ def _findings(joints: Sequence[StaticJoint]) -> Iterator[Finding]:
     if not any(joint.poses for joint in joints):
         yield Finding(
             code="static_none", severity="note", message="no pose was held or slowly passed from both sides",
-            advice="record a motion of `static_motion`: every pose from below and from above",
+            advice="record poses reached from below and from above; static_motion in Python makes such a motion",
         )  # fmt: skip
     for joint in joints:
         if not joint.poses:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,16 +62,23 @@ def standard_parameters(model: TorqueModel, truth: TrueParameters) -> FloatArray
     return np.array([truth.value(parameter.symbol, parameter.joint) for parameter in model.parameters])
 
 
-def compare_with_truth(estimate: Estimate, truth: Truth) -> TruthComparison:
-    """Return how far the estimate's parameters, and its torque along a motion, are from the truth, that of the motors.
+def compare_with_truth(
+    estimate: Estimate, truth: Truth, *, torque_side: Literal["motor", "link"] = "motor"
+) -> TruthComparison:
+    """Return how far the estimate's parameters, and its torque along a motion, are from the truth.
 
     Parameters
     ----------
     truth : of a recording, best one that was not fitted
+    torque_side : where the torque of the fitted recordings was measured, as in `SensorErrors`: behind the gear there is
+        no friction of the drive and no rotor. Both are torques of the joint [Nm or N]
     """
-    values = estimate.base.projection @ standard_parameters(estimate.model, truth.parameters)
+    motors = torque_side == "motor"
+    plant = truth.parameters if motors else truth.parameters.behind_gear()
+    values = estimate.base.projection @ standard_parameters(estimate.model, plant)
     at_once = replace(estimate.processing, delay=0.0)
-    prediction = predict_recording(estimate, _noise_free(estimate, truth), processing=at_once)
+    recording = _noise_free(estimate, truth, truth.tau if motors else truth.gear_torque)
+    prediction = predict_recording(estimate, recording, processing=at_once)
     return TruthComparison(
         values=read_only(values),
         inside=read_only(np.abs(estimate.values - values) <= estimate.half_intervals(confidence=CONFIDENCE)),
@@ -80,13 +87,13 @@ def compare_with_truth(estimate: Estimate, truth: Truth) -> TruthComparison:
     )
 
 
-def _noise_free(estimate: Estimate, truth: Truth) -> Recording:
+def _noise_free(estimate: Estimate, truth: Truth, tau: FloatArray) -> Recording:
     """Return the recording that perfect sensors would have made."""
     return Recording(
         t=truth.reference.t,
         q=truth.q,
         dq=truth.dq,
-        tau=truth.tau,
+        tau=tau,
         joint_names=estimate.robot.joint_names,
         name="truth",
     )

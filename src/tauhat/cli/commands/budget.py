@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tauhat.cli.options import ClusterOption, CutoffOption, JsonOption, LockOption, MapOption, RowsOption
-from tauhat.cli.output import show, unbroken
+from tauhat.cli.options import (
+    ClusterOption,
+    CutoffOption,
+    ExperimentSeedOption,
+    JsonOption,
+    LockOption,
+    MapOption,
+    RowsOption,
+    StudyPageOption,
+    WorkersOption,
+)
 from tauhat.cli.reporting import say, working
+from tauhat.cli.studies import experiment_of, show_result
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from tauhat.simulation.planned_experiment import PlannedExperiment
     from tauhat.studies.error_budget import ErrorBudgetStudy
     from tauhat.studies.study import StudyResult
@@ -55,10 +62,7 @@ class Options:
     seeds: Annotated[int | None, typer.Option("--seeds", metavar="N", min=1, help="True robots.", show_default="5")] = (
         None
     )
-    seed: Annotated[
-        int | None,
-        typer.Option("--seed", min=0, help="Seed of everything random.", show_default="0 or the experiment's"),
-    ] = None
+    seed: ExperimentSeedOption = None
     warmer: Annotated[
         float | None,
         typer.Option(
@@ -68,10 +72,7 @@ class Options:
             show_default="10",
         ),
     ] = None
-    workers: Annotated[
-        int | None,
-        typer.Option("--workers", metavar="N", min=1, help="Processes.", show_default="one a core"),
-    ] = None
+    workers: WorkersOption = None
     cluster: ClusterOption = None
     lock: LockOption = None
     period: Annotated[
@@ -87,12 +88,7 @@ class Options:
     map_file: MapOption = None
     rows: RowsOption = None
     cutoff: CutoffOption = None
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="PAGE.html", help="Page with all text and drawings.", show_default=False
-        ),
-    ] = None
+    output: StudyPageOption = None
     as_json: JsonOption = False
 
 
@@ -109,12 +105,8 @@ def run(options: Options) -> None:
         check_output(options.output, inputs=[options.source, *(options.logs or ())])
     started = time.perf_counter()
     result, found = _of_logs(options) if options.logs else _rehearsed(options)
-    document: dict[str, Any] = {**result.to_dict(), "budget": found, "seconds": time.perf_counter() - started}
-    if options.output is not None:
-        from tauhat.report.study_page import write_study
-
-        document["page"] = str(write_study(options.output, result))
-    show(document, lambda: _view(result, options), as_json=options.as_json)
+    beside = {"budget": found, "seconds": time.perf_counter() - started}
+    show_result(result, beside, page=options.output, as_json=options.as_json)
 
 
 def _refuse_strange(options: Options) -> None:
@@ -156,27 +148,12 @@ def _study(options: Options) -> ErrorBudgetStudy:
 
 
 def _experiment(options: Options) -> PlannedExperiment:
-    """Return what an experiment's file plans, or a typical experiment with a robot."""
-    from tauhat.robots.library import load_robot
-    from tauhat.simulation.experiment_file import is_experiment, load_experiment
+    """Return the experiment with as long a motion as was asked for."""
     from tauhat.studies.error_budget import typical_experiment
 
-    if is_experiment(options.source):
-        if options.lock:
-            raise typer.BadParameter("the experiment's file says that, in [locked]", param_hint="'--lock'")
-        planned = load_experiment(options.source)
-    else:
-        planned = typical_experiment(load_robot(options.source, locked=options.lock))
-    if options.seconds is not None:
-        if planned.motion.given is not None:
-            raise typer.BadParameter("the experiment's motion has its own length", param_hint="'--seconds'")
-        planned = replace(planned, motion=replace(planned.motion, seconds=options.seconds))
-    return planned if options.seed is None else replace(planned, seed=options.seed, robot_seed=options.seed)
-
-
-def _view(result: StudyResult, options: Options) -> Iterator[RenderableType]:
-    from tauhat.cli.views.study import study_view
-
-    yield from study_view(result)
-    if options.output is not None:
-        yield unbroken(f"Written: {options.output}")
+    planned = experiment_of(options.source, typical_experiment, lock=options.lock, seed=options.seed)
+    if options.seconds is None:
+        return planned
+    if planned.motion.given is not None:
+        raise typer.BadParameter("the experiment's motion has its own length", param_hint="'--seconds'")
+    return replace(planned, motion=replace(planned.motion, seconds=options.seconds))

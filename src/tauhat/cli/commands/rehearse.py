@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tauhat.cli.options import ClusterOption, JsonOption, LockOption
-from tauhat.cli.output import show, unbroken
+from tauhat.cli.options import (
+    ClusterOption,
+    ExperimentSeedOption,
+    JsonOption,
+    LockOption,
+    RobotOrExperimentArgument,
+    StudyPageOption,
+    WorkersOption,
+)
 from tauhat.cli.reporting import say, working
+from tauhat.cli.studies import experiment_of, show_result
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
+    from tauhat.robots.robot import Robot
     from tauhat.simulation.planned_experiment import PlannedExperiment
     from tauhat.studies.rehearsal import RehearsalStudy
-    from tauhat.studies.study import StudyResult
 
 _LENGTHS = (5.0, 10.0, 20.0, 40.0)  # [s] that are tried for a target
 _SCALES = (4.0, 2.0, 1.0, 0.5)  # of an experiment's own sensors, likewise
@@ -48,14 +52,7 @@ def numbers(text: str) -> Numbers:
 class Options:
     """What `tauhat rehearse` takes."""
 
-    robot: Annotated[
-        str,
-        typer.Argument(
-            metavar="ROBOT",
-            help="Built-in name (see `tauhat robots`), .urdf file, .toml DH table, or EXPERIMENT.toml.",
-            show_default=False,
-        ),
-    ]
+    robot: RobotOrExperimentArgument
     target: Annotated[
         float | None,
         typer.Option(
@@ -104,22 +101,11 @@ class Options:
         int | None,
         typer.Option("--seeds", metavar="N", min=1, help="True robots.", show_default="20; with --target 8"),
     ] = None
-    seed: Annotated[
-        int | None,
-        typer.Option("--seed", min=0, help="Seed of everything random.", show_default="0 or the experiment's"),
-    ] = None
-    workers: Annotated[
-        int | None,
-        typer.Option("--workers", metavar="N", min=1, help="Processes.", show_default="one a core"),
-    ] = None
+    seed: ExperimentSeedOption = None
+    workers: WorkersOption = None
     cluster: ClusterOption = None
     lock: LockOption = None
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="PAGE.html", help="Page with all text and drawings.", show_default=False
-        ),
-    ] = None
+    output: StudyPageOption = None
     as_json: JsonOption = False
 
 
@@ -137,18 +123,14 @@ def run(options: Options) -> None:
     study, workers = _study(options), workers_of(options.cluster, options.workers)
     with working(study.title):
         result = study.run(workers, tell=lambda text: say(study.key, text))
-    document: dict[str, Any] = {**result.to_dict(), "seconds": time.perf_counter() - started}
-    if options.output is not None:
-        from tauhat.report.study_page import write_study
-
-        document["page"] = str(write_study(options.output, result))
-    show(document, lambda: _view(result, options), as_json=options.as_json)
+    beside = {"seconds": time.perf_counter() - started}
+    show_result(result, beside, page=options.output, as_json=options.as_json)
 
 
 def _study(options: Options) -> RehearsalStudy:
     from tauhat.studies.rehearsal import RehearsalStudy, sensors_named
 
-    experiment = _experiment(options)
+    experiment = experiment_of(options.robot, _usual_experiment, lock=options.lock, seed=options.seed)
     searching, own_sensors = options.target is not None, experiment.sensors != _USUAL
     names = _names(options, everything=searching and not own_sensors, own=own_sensors)
     usual_scales = _SCALES if searching and not names else (1.0,)
@@ -175,28 +157,10 @@ def _names(options: Options, *, everything: bool, own: bool) -> tuple[str, ...]:
     return () if own else (_USUAL,)
 
 
-def _experiment(options: Options) -> PlannedExperiment:
-    """Return what an experiment's file plans, or the usual experiment with a robot."""
-    from tauhat.robots.library import load_robot
+def _usual_experiment(robot: Robot) -> PlannedExperiment:
     from tauhat.simulation.experiment import ExperimentSettings
-    from tauhat.simulation.experiment_file import is_experiment, load_experiment
     from tauhat.simulation.planned_experiment import PlannedExperiment
     from tauhat.simulation.sensors import sensor_preset
 
-    if is_experiment(options.robot):
-        if options.lock:
-            raise typer.BadParameter("the experiment's file says that, in [locked]", param_hint="'--lock'")
-        planned = load_experiment(options.robot)
-    else:
-        robot = load_robot(options.robot, locked=options.lock)
-        settings = ExperimentSettings(sample_rate=_RATE, sensors=sensor_preset(_USUAL, robot))
-        planned = PlannedExperiment(robot=robot, settings=settings, sensors=_USUAL)
-    return planned if options.seed is None else replace(planned, seed=options.seed, robot_seed=options.seed)
-
-
-def _view(result: StudyResult, options: Options) -> Iterator[RenderableType]:
-    from tauhat.cli.views.study import study_view
-
-    yield from study_view(result)
-    if options.output is not None:
-        yield unbroken(f"Written: {options.output}")
+    settings = ExperimentSettings(sample_rate=_RATE, sensors=sensor_preset(_USUAL, robot))
+    return PlannedExperiment(robot=robot, settings=settings, sensors=_USUAL)

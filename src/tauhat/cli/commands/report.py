@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tauhat.cli.options import CutoffOption, EstimateArgument, JsonOption, MapOption, MotionOption, RowsOption
+from tauhat.cli.options import CutoffOption, EstimateArgument, JsonOption, MapOption, MotionOption, RowsOption, page
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
 
@@ -25,7 +25,8 @@ class Options:
 
     estimate: EstimateArgument
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="REPORT.html", help="File to write.", show_default=False)
+        Path,
+        typer.Option("-o", "--output", metavar="REPORT.html", parser=page, help="File to write.", show_default=False),
     ]
     logs: Annotated[
         list[Path] | None,
@@ -48,6 +49,8 @@ def run(options: Options) -> None:
     from tauhat.files import check_output
     from tauhat.report.page import write_report
 
+    if options.residuals and not options.logs:
+        raise typer.BadParameter("needs a LOG that was not fitted", param_hint="'--residuals'")
     estimate = load_estimate(options.estimate)
     given = [options.estimate, *(options.logs or ()), *([options.motion] if options.motion else ())]
     check_output(options.output, inputs=given)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tauhat.cli.options import JsonOption, LockOption, MotionOption
+from tauhat.cli.options import JsonOption, LockOption, MotionOption, RobotOrExperimentArgument
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
 
@@ -29,14 +29,7 @@ _OF_A_FILE = ("robot", "output", "as_json")  # what may stand beside an experime
 class Options:
     """What `tauhat simulate` takes."""
 
-    robot: Annotated[
-        str,
-        typer.Argument(
-            metavar="ROBOT",
-            help="Built-in name (see `tauhat robots`), .urdf file, .toml DH table, or EXPERIMENT.toml.",
-            show_default=False,
-        ),
-    ]
+    robot: RobotOrExperimentArgument
     output: Annotated[
         Path | None,
         typer.Option(

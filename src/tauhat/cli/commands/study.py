@@ -1,4 +1,4 @@
-"""`tauhat study`: a study of methods on simulated arms, with its tables and its page."""
+"""`tauhat study`: a study of methods on simulated arms or on logs of real ones, with its tables and its page."""
 
 from __future__ import annotations
 
@@ -6,19 +6,33 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tauhat.cli.options import ClusterOption, JsonOption
+from tauhat.cli.options import ClusterOption, JsonOption, StudyPageOption, WorkersOption
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import say, working
+from tauhat.cli.studies import show_result
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tauhat.studies.study import StudyResult
     from tauhat.workers import Workers
+
+_SETTINGS = ("seeds", "robot", "cases", "data", "estimators", "models")  # of studies; each says which it takes
+
+
+class Names(tuple[str, ...]):
+    """Names with commas between."""
+
+
+def names(text: str) -> Names:
+    """Return the names that a list has."""
+    found = Names(name.strip() for name in text.split(","))
+    if not all(found):
+        raise typer.BadParameter(f"not names with commas between: {text!r}")
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,37 +47,63 @@ class Options:
         int | None,
         typer.Option("--seeds", metavar="N", min=1, help="Random cases.", show_default="the study's own"),
     ] = None
-    workers: Annotated[
-        int | None,
-        typer.Option("--workers", metavar="N", min=1, help="Processes.", show_default="one a core"),
+    robot: Annotated[
+        str | None,
+        typer.Option("--robot", metavar="ROBOT", help="Arm that is studied.", show_default="the study's own"),
     ] = None
-    cluster: ClusterOption = None
-    output: Annotated[
+    cases: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="PAGE.html", help="Page with all text and drawings.", show_default=False
+            "--cases", metavar="CASES.toml", help="Logs that are fitted and judged.", show_default=False, readable=False
         ),
     ] = None
+    data: Annotated[
+        Path | None,
+        typer.Option("--data", metavar="FOLDER", help="Where those logs are.", show_default="beside CASES.toml"),
+    ] = None
+    estimators: Annotated[
+        Names | None,
+        typer.Option(
+            "--estimators",
+            metavar="NAME[,NAME...]",
+            parser=names,
+            help="Methods that are compared.",
+            show_default="the study's own",
+        ),
+    ] = None
+    models: Annotated[
+        Names | None,
+        typer.Option(
+            "--models",
+            metavar="NAME[,NAME...]",
+            parser=names,
+            help="plain, robust, auto or a TOML file, also with +physical.",
+            show_default="the study's own",
+        ),
+    ] = None
+    workers: WorkersOption = None
+    cluster: ClusterOption = None
+    output: StudyPageOption = None
     as_json: JsonOption = False
 
 
 def run(options: Options) -> None:
-    """Run a study of methods on simulated arms whose truth is known; without a name, list the studies."""
+    """Run a study of methods, on simulated arms or on logs of real ones; without a name, list the studies."""
     if options.name is None:
         _list(options)
         return
+    from tauhat.files import check_output
     from tauhat.studies.registry import study_named
 
-    study = study_named(options.name, seeds=options.seeds)
+    given = {name: value for name in _SETTINGS if (value := getattr(options, name)) is not None}
+    study = study_named(options.name, given)
+    if options.output is not None:
+        check_output(options.output)
     started = time.perf_counter()
     with working(study.title):
         result = study.run(_workers(options), tell=lambda text: say(study.key, text))
-    document: dict[str, Any] = {**result.to_dict(), "seconds": time.perf_counter() - started}
-    if options.output is not None:
-        from tauhat.report.study_page import write_study
-
-        document["page"] = str(write_study(options.output, result))
-    show(document, lambda: _view(result, options), as_json=options.as_json)
+    seconds = time.perf_counter() - started
+    show_result(result, {"seconds": seconds}, page=options.output, as_json=options.as_json)
 
 
 def _workers(options: Options) -> Workers:
@@ -88,11 +128,3 @@ def _list(options: Options) -> None:
         yield unbroken("Run one: tauhat study NAME -o PAGE.html")
 
     show(document, view, as_json=options.as_json)
-
-
-def _view(result: StudyResult, options: Options) -> Iterator[RenderableType]:
-    from tauhat.cli.views.study import study_view
-
-    yield from study_view(result)
-    if options.output is not None:
-        yield unbroken(f"Written: {options.output}")

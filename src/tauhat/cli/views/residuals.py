@@ -26,7 +26,7 @@ def residuals_view(logs: Sequence[LogResiduals]) -> Iterator[RenderableType]:
             yield _effects_table(log)
             yield Text("".join(f"{line}\n" for line in dict.fromkeys(_advice(effect) for _, effect in log.ranked)))
         else:
-            yield Text(f"{log.log}: no effect of the catalogue is left in the residuals.\n")
+            yield Text(f"{log.log}: {log.silence}\n")
 
 
 def _advice(effect: Effect) -> str:
@@ -37,7 +37,7 @@ def _whiteness_table(log: LogResiduals) -> RenderableType:
     from rich.markup import escape
 
     figures = ("rms residual", "rows", "independent", "memory [s]", "colour")
-    made = table(f"{log.log}: residuals, 0 of colour is white noise", ("joint", "unit"), figures)
+    made = table(f"{log.log}: residuals; colour 0 is white noise", ("joint", "unit"), figures)
     rms = aligned([joint.rms for joint in log.joints])
     for joint, text in zip(log.joints, rms, strict=True):
         white = joint.whiteness

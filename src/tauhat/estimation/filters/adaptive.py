@@ -41,6 +41,7 @@ from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, read_only
 from tauhat.blas import single_threaded
+from tauhat.control.adaptive import even_learning
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.dynamics.motion import Motion
 from tauhat.errors import ModelError
@@ -57,7 +58,6 @@ _LOST = 1e3  # the model is lost when its speed is off by this many times the ro
 _LEAST = (0.005, 0.1)  # bounds of the least eigenvalue that a scaled mass matrix must have
 _OF_FIRST = 1.0 / 3.0  # of the least eigenvalue with the parameters to begin with
 _PUT_BACK = 8  # times at most that the parameters are put back in one step
-_DAMPED = 1e-6  # part of its diagonal added to the mean of Y'K^-1 Y before it is inverted
 
 
 class ParallelState(NamedTuple):
@@ -272,12 +272,7 @@ def _with_gains(problem: Problem, bare: ParallelModel, *, gain: FloatArray, time
     for sample in row_samples(problem):
         mean += sample.columns.T @ (sample.columns / gain[:, None])
         count += 1
-    mean /= count
-    damped = mean + _DAMPED * np.diag(np.diag(mean))
-    scale = np.sqrt(np.diag(damped))
-    root = np.linalg.cholesky(damped / np.outer(scale, scale))
-    half = np.linalg.solve(root, np.diag(1.0 / scale))
-    return replace(bare, gain=gain, learning=half.T @ half / time)
+    return replace(bare, gain=gain, learning=even_learning(mean / count, time=time))
 
 
 def _followed(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.dynamics.terms import INERTIAL_SYMBOLS
+from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.errors import ModelError
 from tauhat.estimation.evidence import collect_all
 from tauhat.estimation.filters.samples import units_of
@@ -116,7 +116,7 @@ class Nominal(Beginning):
         robot = problem.model.robot
         if not robot.has_inertia:
             raise ModelError("the robot's description has no masses to begin with", where=robot.name)
-        mean = problem.base.projection @ _nominal(problem)
+        mean = problem.base.projection @ nominal_standard_parameters(problem.model)
         columns, torques = units_of(problem.evidence)
         deviation = self.relative * np.abs(mean) + self.least * float(np.linalg.norm(torques)) / columns
         return Start(mean, np.diag(deviation**2), problem.recordings)
@@ -145,16 +145,3 @@ class Given(Beginning):
 def _check_positive(name: str, value: float) -> None:
     if not 0.0 < value < np.inf:
         raise ModelError(f"beginning: {name} must be positive", got=value)
-
-
-def _nominal(problem: Problem) -> FloatArray:
-    """Return the description's standard parameters, (n_p,); zero where it says nothing."""
-    robot = problem.model.robot
-    known: dict[str, FloatArray] = {
-        "Ia": np.array([joint.rotor_inertia for joint in robot.joints]),
-        "Fv": np.array([joint.viscous for joint in robot.joints]),
-        "Fc": np.array([joint.coulomb for joint in robot.joints]),
-    }
-    known |= {symbol: robot.inertia[:, column] for column, symbol in enumerate(INERTIAL_SYMBOLS)}
-    zero = np.zeros(robot.n_v)
-    return np.array([known.get(item.symbol, zero)[item.joint] for item in problem.model.parameters])

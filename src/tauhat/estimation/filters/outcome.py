@@ -12,16 +12,9 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError, TauhatWarning
 from tauhat.estimation.evidence import Evidence
-from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows
+from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows, diagnosed
 from tauhat.estimation.problem import Problem
-from tauhat.estimation.solution import (
-    Solution,
-    honest_covariance,
-    joint_residuals,
-    joint_torques,
-    rank_and_condition,
-    time_groups,
-)
+from tauhat.estimation.solution import Solution, honest_covariance, joint_residuals, joint_torques, time_groups
 
 
 class Found(NamedTuple):
@@ -92,23 +85,17 @@ def solution_of(evidence: Evidence, found: Found, *, covariance: FloatArray | No
     """
     if found.advice:
         warnings.warn(f"{found.cause}; {found.advice}", TauhatWarning, stacklevel=3)
-    rank, condition = rank_and_condition(evidence, found.weights)
     groups = len(time_groups(evidence))
     rows = evidence.n_v * evidence.n_t - evidence.n_b
     spread = honest_covariance(evidence, found.weights, found.values, ridge=0.0)
     blocked = groups > 1 and not found.advice
     if covariance is not None:
         spread = covariance if found.advice else _raised(covariance, spread)
-    return Solution(
-        values=found.values.copy(),
+    return diagnosed(
+        evidence,
+        Solved(found.values.copy(), found.weights.copy(), found.passes),
         covariance=spread,
-        weights=found.weights.copy(),
-        joint_rms=joint_residuals(evidence, found.values),
-        torque_rms=joint_torques(evidence),
-        rank=rank,
-        condition=condition,
         degrees=groups - 1 if blocked else max(1, rows),
-        passes=found.passes,
         cause=found.cause,
         advice=found.advice,
     )

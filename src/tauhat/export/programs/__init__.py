@@ -2,6 +2,7 @@
 
 from tauhat.export.programs.dialect import DIALECTS, Dialect, program_named
 from tauhat.export.programs.program import ControllerJoints, Program, ProgramSettings, ProgramText, signed_joints
+from tauhat.export.programs.task_programs import language_of, sayable, task_program
 
 __all__ = [
     "DIALECTS",
@@ -10,6 +11,9 @@ __all__ = [
     "Program",
     "ProgramSettings",
     "ProgramText",
+    "language_of",
     "program_named",
+    "sayable",
     "signed_joints",
+    "task_program",
 ]

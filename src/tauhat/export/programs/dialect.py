@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tauhat.errors import ExportError
 from tauhat.excitation.waypoints.motion import WaypointMotion
 from tauhat.excitation.waypoints.settings import WaypointSettings
+from tauhat.export.controller_arms import SIX_JOINTS, harmless_name, has_six_revolute_joints, kinds_of_joints
 from tauhat.export.programs import fanuc, krl, rapid, urscript, viapoints
 from tauhat.export.programs.cell import Cell, Leg, legs_of
 from tauhat.export.programs.program import Program, ProgramSettings, ProgramText
+from tauhat.export.programs.words import Words
 from tauhat.robots.naming import advice_on_name
 from tauhat.robots.robot import Robot
 
-_JOINTS = 6
 _SAME = 1e-9  # [rad or m] within which a motion that repeats has to come back
 
 
@@ -31,6 +32,7 @@ class Dialect:
     parse : reads it
     unsaid : what it leaves to the controller
     six_joints : whether it moves arms of six revolute joints only
+    words : what it can say of a move
     """
 
     key: str
@@ -40,6 +42,7 @@ class Dialect:
     parse: Callable[[Cell, str], Program]
     unsaid: tuple[str, ...]
     six_joints: bool = True
+    words: Words = field(default_factory=Words)
 
     def write(self, motion: WaypointMotion, *, settings: ProgramSettings | None = None) -> ProgramText:
         """Return the program that makes a controller run a motion.
@@ -53,7 +56,7 @@ class Dialect:
         """
         chosen = settings or ProgramSettings()
         cell = Cell(robot=motion.robot, planned=motion.settings, settings=chosen)
-        self._check_robot(motion.robot, chosen)
+        self.check_robot(motion.robot, settings=chosen)
         legs = legs_of(motion)
         away = float(np.abs(legs[-1].end - motion.start).max())
         if chosen.repeats > 1 and away > _SAME:
@@ -89,16 +92,24 @@ class Dialect:
             when a statement is not among those written here, or cannot be: names the line.
         """
         chosen = settings or ProgramSettings()
-        self._check_robot(robot, chosen)
+        self.check_robot(robot, settings=chosen)
         return self.parse(Cell(robot=robot, planned=planned or WaypointSettings(), settings=chosen), text)
 
-    def _check_robot(self, robot: Robot, settings: ProgramSettings) -> None:
-        kinds = [joint.kind for joint in robot.joints]
-        if self.six_joints and kinds != ["revolute"] * _JOINTS:
-            got = f"{kinds.count('revolute')} revolute, {kinds.count('prismatic')} prismatic"
-            expected = f"{_JOINTS} revolute joints"
+    def check_robot(self, robot: Robot, *, settings: ProgramSettings) -> None:
+        """Check that programs of this language can move a robot.
+
+        Raises
+        ------
+        ExportError
+            when its joints are not those of a controller's arm, or the controller counts others.
+        """
+        if self.six_joints and not has_six_revolute_joints(robot):
             raise ExportError(
-                f"{self.title} programs", where=robot.name, expected=expected, got=got, remedy="write a table"
+                f"{self.title} programs",
+                where=robot.name,
+                expected=f"{SIX_JOINTS} revolute joints",
+                got=kinds_of_joints(robot),
+                remedy="write a table",
             )
         if settings.joints is not None and settings.joints.offset.size != robot.n_v:
             size = settings.joints.offset.size
@@ -106,7 +117,7 @@ class Dialect:
 
 
 def _warning(cell: Cell, motion: WaypointMotion) -> tuple[str, ...]:
-    robot = "".join(letter if letter.isprintable() and letter.isascii() else "?" for letter in motion.robot.name)[:60]
+    robot = harmless_name(motion.robot)
     return (
         f"Motion of {robot}, {motion.duration:.1f} s as planned, run {cell.settings.repeats} times.",
         "RUN IT SLOWLY FIRST: at reduced speed, with a hand on the stop.",
@@ -125,11 +136,23 @@ def _left_to_the_controller(motion: WaypointMotion) -> tuple[str, ...]:
 DIALECTS: tuple[Dialect, ...] = (
     Dialect(
         key="urscript", title="URScript", ending=".script", lines=urscript.write, parse=urscript.read,
-        unsaid=urscript.UNSAID,
+        unsaid=urscript.UNSAID, words=Words(joint_zone="radius", line_zone="radius"),
     ),
-    Dialect(key="krl", title="KRL", ending=".src", lines=krl.write, parse=krl.read, unsaid=krl.UNSAID),
-    Dialect(key="rapid", title="RAPID", ending=".mod", lines=rapid.write, parse=rapid.read, unsaid=rapid.UNSAID),
-    Dialect(key="fanuc", title="FANUC", ending=".ls", lines=fanuc.write, parse=fanuc.read, unsaid=fanuc.UNSAID),
+    Dialect(
+        key="krl", title="KRL", ending=".src", lines=krl.write, parse=krl.read, unsaid=krl.UNSAID,
+        words=Words(joint_zone="part", line_zone="radius"),
+    ),
+    Dialect(
+        key="rapid", title="RAPID", ending=".mod", lines=rapid.write, parse=rapid.read, unsaid=rapid.UNSAID,
+        words=Words(
+            joint_zone="radius", line_zone="radius", least_acceleration=rapid.LEAST_ACCELERATION,
+            least_line_acceleration=rapid.LEAST_PATH,
+        ),
+    ),
+    Dialect(
+        key="fanuc", title="FANUC", ending=".ls", lines=fanuc.write, parse=fanuc.read, unsaid=fanuc.UNSAID,
+        words=Words(joint_zone="part", line_zone="part", line_speed_step=1e-3, dwell_step=fanuc.DWELL),
+    ),
     Dialect(
         key="csv", title="via-points", ending=".csv", lines=viapoints.write_csv, parse=viapoints.read_csv,
         unsaid=viapoints.UNSAID, six_joints=False,

@@ -32,7 +32,7 @@ UNSAID = (
 )
 _REMARK = 32  # letters of a remark on the pendant
 _CNT = 100.0 / LARGEST_PART
-_DWELL = 0.01  # [s] step of WAIT
+DWELL = 0.01  # [s] step of WAIT
 _LEAST_LENGTH = 1e-6  # [m] of a line
 _ANGLES = "WPR"
 
@@ -73,7 +73,7 @@ def _main(cell: Cell, legs: Sequence[Leg], head: Sequence[str]) -> Iterator[str]
     for leg in legs:
         yield _motion(cell, leg)
         if leg.move.dwell > 0.0:
-            yield f"  WAIT {_DWELL * whole_steps(leg.move.dwell, _DWELL, 'dwell [s]', leg.where):.2f}(sec)"
+            yield f"  WAIT {DWELL * whole_steps(leg.move.dwell, DWELL, 'dwell [s]', leg.where):.2f}(sec)"
     if settings.repeats > 1:
         yield "  ENDFOR"
 

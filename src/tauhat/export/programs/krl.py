@@ -21,7 +21,7 @@ from tauhat.export.programs.angles import pose_in_degrees, pose_of_degrees
 from tauhat.export.programs.cell import Cell, Leg
 from tauhat.export.programs.digits import DEGREES, MILLIMETRES, NUMBER, RATE, decimal, part, whole_steps
 from tauhat.export.programs.program import Program
-from tauhat.export.programs.reading import Gathered, passed, rule, scan
+from tauhat.export.programs.reading import Gathered, Registers, passed, rule, scan
 
 COMMENT = ";"
 UNSAID = (
@@ -118,31 +118,28 @@ def _check_zones(legs: Sequence[Leg]) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Reader:
-    """The values that hold until they are set again."""
+    """Takes the moves, with what holds for them."""
 
     cell: Cell
     gathered: Gathered
-    values: dict[str, float]
-
-    def put(self, match: re.Match[str]) -> None:
-        self.values[match[1]] = float(match[2])
+    held: Registers
 
     def ptp(self, match: re.Match[str]) -> None:
         target = self.cell.meant(np.deg2rad([float(match[joint]) for joint in range(1, 7)]))
         if self.gathered.start is None:
             self.gathered.begin(target)
             return
-        zone = Zone(part=self.value("APO.CPTP") / 200.0) if match[7] else None
-        speed, acceleration = self.value("VEL_PTP") / 100.0, self.value("ACC_PTP") / 100.0
+        zone = Zone(part=self.held.value("APO.CPTP") / 200.0) if match[7] else None
+        speed, acceleration = self.held.value("VEL_PTP") / 100.0, self.held.value("ACC_PTP") / 100.0
         self.gathered.add(JointMove(target=target, speed=speed, acceleration=acceleration, zone=zone))
 
     def lin(self, match: re.Match[str]) -> None:
         pose = pose_of_degrees(np.array([float(match[place]) for place in range(1, 7)]))
-        tool, zone = self.cell.planned.tool, Zone(radius=self.value("APO.CDIS") / 1e3) if match[7] else None
+        tool, zone = self.cell.planned.tool, Zone(radius=self.held.value("APO.CDIS") / 1e3) if match[7] else None
         move = LineMove(
             target=self.cell.meant_pose(pose),
-            speed=part(self.value("VEL.CP"), tool.speed, "the speed"),
-            acceleration=part(self.value("ACC.CP"), tool.acceleration, "the acceleration"),
+            speed=part(self.held.value("VEL.CP"), tool.speed, "the speed"),
+            acceleration=part(self.held.value("ACC.CP"), tool.acceleration, "the acceleration"),
             zone=zone,
         )
         self.check_turns(move)
@@ -150,14 +147,9 @@ class _Reader:
 
     def check_turns(self, move: LineMove) -> None:
         for name, expected in zip(_CP, _line_rates(self.cell, move), strict=True):
-            if abs(self.value(name) / expected - 1.0) > 1e3 * _SAME:
+            if abs(self.held.value(name) / expected - 1.0) > 1e3 * _SAME:
                 message = f"${name} is another part of its limit than the speed of the tool"
-                raise ExportError(message, expected=f"{expected:g}", got=f"{self.value(name):g}")
-
-    def value(self, name: str) -> float:
-        if name not in self.values:
-            raise ExportError(f"a move before {name} is set")
-        return self.values[name]
+                raise ExportError(message, expected=f"{expected:g}", got=f"{self.held.value(name):g}")
 
 
 def read(cell: Cell, text: str) -> Program:
@@ -168,8 +160,8 @@ def read(cell: Cell, text: str) -> Program:
     ExportError
         when a line is not among those that `write` writes.
     """
-    gathered = Gathered()
-    reader = _Reader(cell=cell, gathered=gathered, values={})
+    gathered, held = Gathered(), Registers()
+    reader = _Reader(cell=cell, gathered=gathered, held=held)
     axes = ", ".join(rf"{name} {NUMBER}" for name in _AXES)
     places = ", ".join(rf"{name} {NUMBER}" for name in _PLACES)
     tool = cell.settings.tool
@@ -177,8 +169,8 @@ def read(cell: Cell, text: str) -> Program:
         rule(r"DEF [A-Za-z]\w*\( \)", passed),
         rule(r"DECL INT i", passed),
         rule(rf"BAS\( #INITMOV, 0 \)|BAS\( #TOOL, {tool} \)|BAS\( #BASE, 0 \)|\$ADVANCE = 3", passed),
-        rule(r"BAS\( #(VEL_PTP|ACC_PTP), (\d{1,3}) \)", reader.put),
-        rule(rf"\$({'|'.join(map(re.escape, (*_CP, 'APO.CPTP', 'APO.CDIS')))}) = {NUMBER}", reader.put),
+        rule(r"BAS\( #(VEL_PTP|ACC_PTP), (\d{1,3}) \)", held.put),
+        rule(rf"\$({'|'.join(map(re.escape, (*_CP, 'APO.CPTP', 'APO.CDIS')))}) = {NUMBER}", held.put),
         rule(rf"PTP \{{ {axes} \}}( C_PTP)?", reader.ptp),
         rule(rf"LIN \{{ {places} \}}( C_DIS)?", reader.lin),
         rule(rf"WAIT SEC {NUMBER}", lambda match: gathered.dwell(float(match[1]))),

@@ -30,7 +30,7 @@ from tauhat.export.programs.digits import (
     values_of,
 )
 from tauhat.export.programs.program import Program
-from tauhat.export.programs.reading import Gathered, passed, rule, scan
+from tauhat.export.programs.reading import Gathered, Registers, passed, rule, scan
 from tauhat.robots.kinematics import Pose
 from tauhat.robots.transforms import quaternion
 
@@ -40,8 +40,8 @@ UNSAID = (
     "Accelerations of joint moves are parts of those set up on the controller (AccSet).",
     "Lines are those of the tool data named at the end of each move.",
 )
-_LEAST_ACCELERATION = 0.2  # below which AccSet makes 20 per cent of it
-_LEAST_PATH = 0.1  # of PathAccLim [m/s^2]
+LEAST_ACCELERATION = 0.2  # below which AccSet makes 20 per cent of it
+LEAST_PATH = 0.1  # of PathAccLim [m/s^2]
 _NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 _KNOWN_ZONES = (1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200)  # [mm] of the zone data z1 to z200
 _MOST_TOOL_SPEED = 7000  # [mm/s] to which VelSet bounds it: above what robots reach
@@ -84,10 +84,10 @@ def write(cell: Cell, legs: Sequence[Leg], head: Sequence[str]) -> Iterator[str]
 def _statements(cell: Cell, leg: Leg) -> Iterator[str]:
     move, zone = leg.move, _zone_word(leg)
     if isinstance(move, JointMove):
-        if move.acceleration < _LEAST_ACCELERATION:
+        if move.acceleration < LEAST_ACCELERATION:
             raise ExportError(
                 "RAPID knows no acceleration this low", where=leg.where,
-                expected=f"at least {_LEAST_ACCELERATION:g}", got=f"{move.acceleration:g}",
+                expected=f"at least {LEAST_ACCELERATION:g}", got=f"{move.acceleration:g}",
             )  # fmt: skip
         yield "PathAccLim FALSE, FALSE;"
         yield f"VelSet {decimal(100.0 * move.speed, RATE)}, {_MOST_TOOL_SPEED};"
@@ -95,8 +95,8 @@ def _statements(cell: Cell, leg: Leg) -> Iterator[str]:
         yield _joint_move(cell, move.target, zone)
     else:
         acceleration = move.acceleration * cell.planned.tool.acceleration
-        if acceleration < _LEAST_PATH:
-            expected = f"at least {_LEAST_PATH:g} m/s^2"
+        if acceleration < LEAST_PATH:
+            expected = f"at least {LEAST_PATH:g} m/s^2"
             raise ExportError(
                 "RAPID knows no acceleration this low", where=leg.where, expected=expected, got=f"{acceleration:g}"
             )
@@ -139,30 +139,27 @@ def _zone_word(leg: Leg) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Reader:
-    """The values that hold until they are set again."""
+    """Takes the moves, with what holds for them."""
 
     cell: Cell
     gathered: Gathered
-    values: dict[str, float]
-
-    def put(self, match: re.Match[str]) -> None:
-        self.values[match[1]] = float(match[2])
+    held: Registers
 
     def limit(self, match: re.Match[str]) -> None:
         if match[1] != match[2]:
             raise ExportError("PathAccLim with two values", got=f"{match[1]} and {match[2]}")
-        self.values["PathAccLim"] = float(match[1])
+        self.held.values["PathAccLim"] = float(match[1])
 
     def unlimit(self, _: re.Match[str]) -> None:
-        self.values.pop("PathAccLim", None)
+        self.held.values.pop("PathAccLim", None)
 
     def joint(self, match: re.Match[str]) -> None:
         target = self.cell.meant(np.deg2rad(values_of(match[1])))
         if self.gathered.start is None:
             self.gathered.begin(target)
             return
-        speed = part(self.value("VelSet"), 100.0, "VelSet")
-        acceleration = part(self.value("AccSet"), 100.0, "AccSet")
+        speed = part(self.held.value("VelSet"), 100.0, "VelSet")
+        acceleration = part(self.held.value("AccSet"), 100.0, "AccSet")
         self.gathered.add(JointMove(target=target, speed=speed, acceleration=acceleration, zone=_zone(match[2])))
 
     def line(self, match: re.Match[str]) -> None:
@@ -172,16 +169,11 @@ class _Reader:
         expected = np.array([1e3 * tool.speed, np.rad2deg(tool.turn_speed)] * 2) * speed
         if not np.allclose(data, expected, rtol=_SAME, atol=0.0):
             raise ExportError("speed data of which turns are another part of their limit", expected=expected, got=data)
-        if self.value("VelSet") != 100.0 or self.value("AccSet") != 100.0:
+        if self.held.value("VelSet") != 100.0 or self.held.value("AccSet") != 100.0:
             raise ExportError("a line under VelSet or AccSet", expected="both 100")
-        acceleration = part(self.value("PathAccLim"), tool.acceleration, "PathAccLim")
+        acceleration = part(self.held.value("PathAccLim"), tool.acceleration, "PathAccLim")
         target = self.cell.meant_pose(shown)
         self.gathered.add(LineMove(target=target, speed=speed, acceleration=acceleration, zone=_zone(match[4])))
-
-    def value(self, name: str) -> float:
-        if name not in self.values:
-            raise ExportError(f"a move before {name}")
-        return self.values[name]
 
 
 def _zone(word: str) -> Zone | None:
@@ -202,15 +194,15 @@ def read(cell: Cell, text: str) -> Program:
     ExportError
         when a line is not among those that `write` writes.
     """
-    gathered = Gathered()
-    reader = _Reader(cell=cell, gathered=gathered, values={})
+    gathered, held = Gathered(), Registers()
+    reader = _Reader(cell=cell, gathered=gathered, held=held)
     ending = rf"tool{cell.settings.tool} \\WObj:=wobj0;"
     zone = rf"(fine|z\d{{1,3}}|\[FALSE{f',{_plain()}' * 6}\])"
     pose = rf"\[{_list(3)}\],\[{_list(4)}\]"
     rules = [
         rule(r"MODULE [A-Za-z]\w*|PROC [A-Za-z]\w*\(\)|ConfL \\(?:On|Off);", passed),
-        rule(rf"(VelSet) {NUMBER}, {_MOST_TOOL_SPEED};", reader.put),
-        rule(rf"(AccSet) {NUMBER}, 100;", reader.put),
+        rule(rf"(VelSet) {NUMBER}, {_MOST_TOOL_SPEED};", held.put),
+        rule(rf"(AccSet) {NUMBER}, 100;", held.put),
         rule(r"PathAccLim FALSE, FALSE;", reader.unlimit),
         rule(rf"PathAccLim TRUE \\AccMax:={NUMBER}, TRUE \\DecelMax:={NUMBER};", reader.limit),
         rule(rf"MoveAbsJ \[\[{_list(6)}\],{re.escape(_NO_AXES)}\] \\NoEOffs, vmax, {zone}, {ending}", reader.joint),

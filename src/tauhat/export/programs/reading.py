@@ -69,6 +69,29 @@ def scan(text: str, rules: Sequence[Rule], *, language: str, comment: str) -> No
             raise ExportError(str(error), where=where) from error
 
 
+class Registers:
+    """Values that statements set, and that hold for all moves until they are set again."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, float] = {}
+
+    def put(self, match: re.Match[str]) -> None:
+        """Take a statement of a name and its value."""
+        self.values[match[1]] = float(match[2])
+
+    def value(self, name: str) -> float:
+        """Return the value of a name.
+
+        Raises
+        ------
+        ExportError
+            when it is not set.
+        """
+        if name not in self.values:
+            raise ExportError(f"a move before {name} is set")
+        return self.values[name]
+
+
 class Gathered:
     """What the lines of a program have said so far.
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from tauhat.errors import TauhatWarning
 from tauhat.estimation.estimate import Estimate, input_log, load_estimate
+from tauhat.export.controller_arms import has_six_revolute_joints
 from tauhat.files import write_text
 from tauhat.project.settings import DesignedMotion, GivenLogs, Project, SimulatedLogs, labelled
 from tauhat.project.step import log_files
@@ -23,7 +24,6 @@ from tauhat.robots.robot import Robot
 
 ROBOT, ESTIMATE, VERIFICATION = "robot/robot.json", "estimate.json", "verification.json"
 CHECKS, REPORT, DESIGN, ADVICE = "checks.json", "report.html", "motion/design.json", "recordings/RECORD.md"
-_PROGRAM_JOINTS = 6  # all revolute
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,8 +54,7 @@ class Workplace:
     @property
     def programs(self) -> tuple[str, ...]:
         """Programs of designed motions, for arms that Universal Robots programs move; else none."""
-        kinds = [joint.kind for joint in self.robot.joints]
-        if kinds != ["revolute"] * _PROGRAM_JOINTS or not isinstance(self.project.motion, DesignedMotion):
+        if not has_six_revolute_joints(self.robot) or not isinstance(self.project.motion, DesignedMotion):
             return ()
         return tuple(f"{name.removesuffix('.parquet')}.script" for name in self.motions)
 

@@ -13,14 +13,15 @@ from tauhat.studies.comparison import Comparison
 def comparison(result: Comparison) -> Section:
     """Return the table of all outcomes, the errors as bars, and what was warned of."""
     plot = _bars(result)
-    html = rendered("comparison.html.j2", result=result, best=result.best, plot=plot)
+    sets = any(outcome.fitted_to for outcome in result.outcomes)
+    html = rendered("comparison.html.j2", result=result, best=result.best, plot=plot, sets=sets)
     return Section(key="comparison", title="Error on recordings that were not fitted", html=html, plots=(plot,))
 
 
 def _bars(result: Comparison) -> Plot:
     figure = go.Figure()
     done = [outcome for outcome in result.outcomes if not outcome.failure]
-    names = [plain(f"{outcome.model}, {outcome.estimator}") for outcome in done]
+    names = [plain(outcome.name) for outcome in done]
     figure.add_trace(go.Bar(x=names, y=[100.0 * outcome.fit for outcome in done], name="fit"))
     for index, log in enumerate(result.judged):
         errors = [100.0 * outcome.unseen[index] for outcome in done]

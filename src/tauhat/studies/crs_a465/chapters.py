@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tauhat.studies.crs_a465.coordinates import coordinates
@@ -182,23 +184,27 @@ def _joints() -> tuple[str, ...]:
 
 
 def _bars(found: Findings) -> Chart:
-    groups = [(condition, name) for condition in CONDITIONS for name in TERMS]
-    series = tuple(
-        Series(
-            name=method,
-            x=tuple(f"{condition}, {name}" for condition, name in groups),
-            y=tuple(100 * found.torque(Case(condition, name, method)) for condition, name in groups),
-        )
-        for method in METHODS
-    )
     return Chart(
         title="Error on the unseen motion, all joints",
         kind="bars",
         x_title="noise and model",
         y_title="error [% of torque]",
-        series=series,
+        series=_by_method(found.torque),
         logarithmic=("y",),
         note=_OVER_ARMS,
+    )
+
+
+def _by_method(value: Callable[[Case], float]) -> tuple[Series, ...]:
+    """Return the bars of each method over noise and model, in per cent."""
+    groups = [(condition, name) for condition in CONDITIONS for name in TERMS]
+    return tuple(
+        Series(
+            name=method,
+            x=tuple(f"{condition}, {name}" for condition, name in groups),
+            y=tuple(100 * value(Case(condition, name, method)) for condition, name in groups),
+        )
+        for method in METHODS
     )
 
 
@@ -266,21 +272,12 @@ def interval_chapter(found: Findings) -> Chapter:
         rows=tuple(rows),
         note=f"Over {len(found.arms)} arms; the worst parameter is the one whose intervals miss most often.",
     )
-    groups = [(condition, name) for condition in CONDITIONS for name in TERMS]
-    series = tuple(
-        Series(
-            name=method,
-            x=tuple(f"{condition}, {name}" for condition, name in groups),
-            y=tuple(100 * float(held[Case(condition, name, method)].mean()) for condition, name in groups),
-        )
-        for method in METHODS
-    )
     chart = Chart(
         title="Intervals that hold the truth",
         kind="bars",
         x_title="noise and model",
         y_title="share of 95 % intervals [%]",
-        series=series,
+        series=_by_method(lambda case: float(held[case].mean())),
         note="95 is right.",
     )
     return Chapter(title="Whether the error bars hold", text=text, tables=(table,), charts=(chart,))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
+from tauhat.studies.doubts import doubts_chapter
 from tauhat.studies.study import Chapter, Chart, Series, Table
 from tauhat.verification.error_budget import WORTH, BudgetSettings, ErrorBudget
 
@@ -31,7 +30,11 @@ def summary_of(settings: BudgetSettings, budget: ErrorBudget) -> str:
 
 def chapters_of(settings: BudgetSettings, budget: ErrorBudget) -> tuple[Chapter, ...]:
     """Return all chapters."""
-    doubts = _doubts(budget)
+    doubts = doubts_chapter(
+        (robot.failure for robot in budget.robots),
+        (doubt for robot in budget.robots for doubt in robot.doubts),
+        of="robots",
+    )
     return (_ranked(budget), _to_do(budget), _together(budget), *((doubts,) if doubts else ()), _done(settings, budget))
 
 
@@ -118,19 +121,6 @@ def _together(budget: ErrorBudget) -> Chapter:
         "difference is what it does together with others.",
     )
     return Chapter(title="Alone and together", text=(), tables=(table,))
-
-
-def _doubts(budget: ErrorBudget) -> Chapter | None:
-    """Return what the library doubted or refused, with how often; None where nothing."""
-    failures = Counter(robot.failure for robot in budget.robots if robot.failure)
-    doubts = Counter(doubt for robot in budget.robots for doubt in robot.doubts)
-    rows = [("no model", text, count) for text, count in failures.most_common(10)]
-    rows += [("warning", text, count) for text, count in doubts.most_common(10)]
-    if not rows:
-        return None
-    header = ("kind", "in the words of the library", "of the robots")
-    table = Table(title="Warnings and failures", header=header, rows=tuple(rows))
-    return Chapter(title="What the library doubted", text=(), tables=(table,))
 
 
 def _done(settings: BudgetSettings, budget: ErrorBudget) -> Chapter:

@@ -107,7 +107,7 @@ def _changed(budget: LogBudget) -> Table:
         header=("what", "share [%]", "on joints"),
         rows=tuple((share.effect, _percent(share.share), _joints(share)) for share in budget.changed),
         note="What refitting these parameters on this log would remove. These shares overlap with one another and with "
-        "the parts above. In brackets: share of the joint's own squared residual.",
+        "the parts above. Behind a joint: share of its own squared residual.",
     )
 
 

@@ -15,18 +15,16 @@ from tauhat.blas import single_threaded
 from tauhat.errors import TauhatError, TauhatWarning
 from tauhat.estimation.closed_loop import ClosedLoop
 from tauhat.estimation.estimators import estimator_named
-from tauhat.estimation.filters.outcome import Recursion
 from tauhat.estimation.least_squares import Estimator
 from tauhat.estimation.output_error import OutputError
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.simulating import SimulationEstimator
 from tauhat.estimation.solution import Solution
-from tauhat.estimation.total_least_squares import TotalLeastSquares
+from tauhat.studies.bad_ends import bad_end
 from tauhat.studies.monte_carlo.experiment import Disturbance, Experiment, experiment_of, logged, problem_of
 from tauhat.studies.monte_carlo.measures import column_sizes, model_torque, relative_error
 
 CONFIDENCE = 0.95
-_DOUBTFUL = (Recursion, SimulationEstimator, TotalLeastSquares)  # whose advice means that the end is no good one
 _WARM_ROBOT, _WARM_SECONDS = "two_link", 2.0  # of the fits before the first that is timed
 
 
@@ -151,7 +149,7 @@ def _judged(blank: Fit, experiment: Experiment, found: _Solved) -> Fit:
         condition=found.solution.condition,
         n_parameters=base.n_b,
         cause=found.solution.cause,
-        doubt=found.solution.cause if isinstance(found.method, _DOUBTFUL) and found.solution.advice else "",
+        doubt=bad_end(found.method, cause=found.solution.cause, advice=found.solution.advice),
     )
 
 

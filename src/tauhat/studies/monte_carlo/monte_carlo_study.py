@@ -39,6 +39,7 @@ class MonteCarloStudy(Study):
 
     key: ClassVar[str] = "estimators"
     title: ClassVar[str] = "Estimators compared by Monte Carlo"
+    takes: ClassVar[tuple[str, ...]] = ("seeds", "estimators")
     robots: tuple[str, ...] = ("staubli_tx40", "ur5e")
     noises: tuple[float, ...] = (0.1, 1.0, 5.0)
     rates: tuple[float, ...] = (100.0, 500.0, 1000.0)

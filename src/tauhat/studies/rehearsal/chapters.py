@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 
+from tauhat.studies.doubts import doubts_chapter
 from tauhat.studies.rehearsal.cells import Cell
 from tauhat.studies.rehearsal.findings import Findings
 from tauhat.studies.rehearsal.trials import BAND
@@ -13,6 +12,7 @@ from tauhat.studies.study import Cell as TableCell
 from tauhat.studies.study import Chapter, Chart, Series, Table
 
 _ERROR = "error of the torque on an unseen motion [%]"
+_FEWEST_TO_SPREAD = 5  # robots whose tenths are told
 _MOST = 0.5  # share of the squared error that constant errors of the sensors make, from which it is told
 
 
@@ -29,10 +29,9 @@ def summary_of(found: Findings) -> str:
 
 
 def _verdict(found: Findings, told: Cell) -> str:
-    name, within = found.experiment.robot.name, f"{100 * told.low:.3g} to {100 * told.high:.3g} %"
+    name = found.experiment.robot.name
     what = f"{told.seconds:g} s of motion with {told.sensors} sensors"
-    figures = f"the torque of an unseen motion is off by {100 * told.error:.3g} % (median of {told.robots} robots; "
-    figures += f"eight of ten are at {within})"
+    figures = f"the torque of an unseen motion is off by {100 * told.error:.3g} % ({_of_robots(told)})"
     if found.target is None:
         return f"{name}: from {what}, {figures}."
     wanted = f"{100 * found.target:g} %"
@@ -41,13 +40,21 @@ def _verdict(found: Findings, told: Cell) -> str:
     return f"{name}: for {wanted}, {what} will do: {figures}."
 
 
+def _of_robots(told: Cell) -> str:
+    if told.robots == 1:
+        return "one robot"
+    within = f"{100 * told.low:.3g} to {100 * told.high:.3g} %"
+    spread = f"; eight of ten are at {within}" if told.robots >= _FEWEST_TO_SPREAD else ""
+    return f"median of {told.robots} robots{spread}"
+
+
 def _constant_words(told: Cell) -> str:
     """Return what is to be said where most of the error is what the torque sensors are always wrong by."""
     if not told.error**2 - told.as_sensed**2 > _MOST * told.error**2:
         return ""
     return (
         "Most of it is what the torque sensors are always wrong by, their factors and offsets: without these the model "
-        f"is off by {100 * told.as_sensed:.3g} %. No longer motion helps there; zeroed sensors and tauhat "
+        f"is off by {100 * told.as_sensed:.3g} %. A longer motion does not help there; zeroed sensors and tauhat "
         "calibrate-drives do."
     )
 
@@ -57,7 +64,11 @@ def chapters_of(found: Findings) -> tuple[Chapter, ...]:
     chapters = [_errors(found)]
     if found.shown is not None:
         chapters.append(_joints(found, found.shown))
-    doubts = _doubts(found)
+    doubts = doubts_chapter(
+        (outcome.failure for outcome in found.outcomes),
+        (doubt for outcome in found.outcomes for doubt in outcome.doubts),
+        of="identifications",
+    )
     if doubts is not None:
         chapters.append(doubts)
     return (*chapters, _done(found))
@@ -152,23 +163,6 @@ def _joints(found: Findings, told: Cell) -> Chapter:
         title="Error joint by joint", kind="bars", x_title="joint", y_title=_ERROR, series=(series,), note=note
     )
     return Chapter(title="Joint by joint", text=(), tables=(table,), charts=(chart,))
-
-
-def _doubts(found: Findings) -> Chapter | None:
-    """Return what the library doubted or refused, with how often; None where nothing."""
-    failures = Counter(outcome.failure for outcome in found.outcomes if outcome.failure)
-    doubts = Counter(doubt for outcome in found.outcomes for doubt in outcome.doubts)
-    rows = [("no model", text, count) for text, count in failures.most_common(10)]
-    rows += [("warning", text, count) for text, count in doubts.most_common(10)]
-    if not rows:
-        return None
-    table = Table(
-        title="Warnings and failures",
-        header=("kind", "in the words of the library", "of the identifications"),
-        rows=tuple(rows),
-        note="The ten commonest of each kind.",
-    )
-    return Chapter(title="What the library doubted", text=(), tables=(table,))
 
 
 def _done(found: Findings) -> Chapter:

@@ -210,13 +210,8 @@ def _torque(truth: Truth, settings: ExperimentSettings) -> FloatArray:
 
 def _share_inside(estimate: Estimate, truth: TrueParameters, errors: SensorErrors) -> float:
     """Return the share of the base parameters whose interval holds the truth of the side where torque is sensed."""
-    if errors.torque_side == "link":
-        none = np.zeros(truth.n_v)
-        laws = tuple(law for law in truth.laws if law.side == "link")
-        truth = replace(
-            truth, rotor=none, viscous=none, coulomb=none, offset=none, laws=laws, elasticity=None, heat=None
-        )
-    values = estimate.base.projection @ standard_parameters(estimate.model, truth)
+    sensed = truth.behind_gear() if errors.torque_side == "link" else truth
+    values = estimate.base.projection @ standard_parameters(estimate.model, sensed)
     inside = np.abs(estimate.values - values) <= estimate.half_intervals(confidence=CONFIDENCE)
     return float(inside.mean())
 

@@ -73,7 +73,7 @@ def _motion(found: Findings) -> tuple[str, str, str]:
     figure = f"{none:.3g} without a model, {nominal:.3g} nominal, {identified:.3g} identified (1e-3 rad or m)"
     if not identified < _BETTER * nominal:
         return "Does it make the robot follow better?", figure, "no better than the description"
-    so = f"yes; joints bend by {bend:.3g}, which no controller here sees" if bend > 0.0 else "yes"
+    so = f"yes; the bending of the joints, {bend:.3g}, is seen by no controller here" if bend > 0.0 else "yes"
     return "Does it make the robot follow better?", figure, so
 
 
