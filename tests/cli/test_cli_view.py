@@ -11,9 +11,10 @@ from typer.testing import CliRunner
 
 from tauhat.cli.app import app
 from tauhat.excitation import random_fourier
+from tauhat.recordings.reading import read_recording
 from tauhat.recordings.recording import Recording
 from tauhat.recordings.writing import write_recording
-from tauhat.robots import load_robot
+from tauhat.robots import forward_kinematics, load_robot
 
 
 def written(folder: Path, name: str) -> Path:
@@ -53,6 +54,27 @@ def test_no_open_opens_nothing(tmp_path: Path, still: list[str]):
     assert "this machine only" in result.stdout
     assert "http://127.0.0.1:18" in result.stdout
     assert still == []
+
+
+def test_the_region_of_a_task_is_drawn_with_the_way_of_its_tool(
+    tmp_path: Path, still: list[str], monkeypatch: pytest.MonkeyPatch
+):
+    drawn: list[np.ndarray] = []
+    monkeypatch.setattr("tauhat.report.view._draw", lambda *words, **_: drawn.extend(words[2]))
+    task = tmp_path / "task.toml"
+    box = '[region]\nkind = "box"\nlower = [0, 0, 0]\nupper = [1, 1, 1]\n'
+    task.write_text(f"home = [0.3, -1.3, 1.6, -1.8, -1.4, 0]\n{box}")
+    words = ["view", str(written(tmp_path, "ur5e")), "--robot", "ur5e", "--no-open", "--port", "18473"]
+    result = CliRunner().invoke(app, [*words, "--task", str(task)])
+    assert result.exit_code == 0, result.stderr
+    *edges, path = drawn
+    assert len(edges) == 12
+    q = read_recording(tmp_path / "motion.parquet").q
+    assert np.allclose(path, forward_kinematics(load_robot("ur5e"), q, frame="tool").translation)
+    task.write_text("[region]")
+    result = CliRunner().invoke(app, [*words, "--task", str(task)])
+    assert result.exit_code == 1
+    assert "a key is missing" in result.stderr
 
 
 def test_robots_that_share_joint_names_must_be_told_apart(tmp_path: Path):

@@ -208,12 +208,14 @@ def test_stages_move_as_fast_as_they_are_told_to(found):
 
 
 def test_the_whole_is_the_weighted_sum_of_its_stages(found):
-    seconds = np.array([stage.stage.seconds for stage in found.stages])
+    seconds = np.array([stage.repeats * stage.motion.duration for stage in found.stages])
     weighted = sum(part * stage.information for part, stage in zip(seconds / seconds.sum(), found.stages, strict=True))
     assert found.information() == pytest.approx(weighted, rel=1e-12)
     heavy = replace(found.stages[1], stage=replace(found.stages[1].stage, weight=3.0))
     other = replace(found, stages=(found.stages[0], heavy)).information()
-    assert other == pytest.approx((found.stages[0].information + 3.0 * found.stages[1].information) / 4.0, rel=1e-12)
+    shares = seconds * [1.0, 3.0] / (seconds @ [1.0, 3.0])
+    expected = sum(part * stage.information for part, stage in zip(shares, found.stages, strict=True))
+    assert other == pytest.approx(expected, rel=1e-12)
 
 
 def test_figures_are_those_of_the_regressor_of_the_motion(found):
@@ -242,7 +244,7 @@ def test_figures_are_those_of_the_regressor_of_the_motion(found):
 
 
 def test_more_stages_never_make_a_parameter_less_sure(found):
-    # Both stages give as many readings, so what the second adds can only help.
+    # Readings add up, so what the second stage adds can only help.
     assert (found.errors() <= found.errors(1) * (1.0 + 1e-9)).all()
     assert set(found.visible(1)) <= set(found.visible())
     figures = found.to_dict()

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 
 from tauhat.errors import RecordingError
 from tauhat.excitation import motion_limits, random_fourier
+from tauhat.excitation.task_design import BoxRegion
 from tauhat.recordings.recording import Recording
 from tauhat.report.replay import Replay, replay
 from tauhat.robots import Robot, forward_kinematics, load_robot
@@ -125,6 +126,41 @@ def test_a_browser_shows_the_arm_and_it_moves(film, browser):
     finally:
         shown.terminate()
         shown.wait(timeout=20)
+        viewer.stop()
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_browser_shows_the_region_of_a_task_and_the_way_of_its_tool(film, browser):
+    pytest.importorskip("viser", reason="viser is not installed: the view was not looked at")
+    from tauhat.report.view import Viewer
+
+    side = BoxRegion(lower=np.array([0.3, -0.6, 0.1]), upper=np.array([0.8, 0.6, 0.9]), rotation=np.eye(3))
+    path = np.array([[0.2, -1.0, 1.1], [0.2, 1.0, 1.1]])
+    viewer = Viewer(film, port=free_port(), outline=side.outline(), path=path)
+    shown = subprocess.Popen([*browser, viewer.url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        picture = np.asarray(first_client(viewer).get_render(height=240, width=320), dtype=float)[..., :3]
+        red, green, blue = np.moveaxis(picture, 2, 0)
+        assert ((green > red + 40) & (green > blue + 20)).mean() > 0.002  # the region: green lines
+        assert ((red > green + 40) & (blue > green + 20)).mean() > 0.0005  # the way: purple
+    finally:
+        shown.terminate()
+        shown.wait(timeout=20)
+        viewer.stop()
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 2.0, -3.0])
+def test_the_camera_is_on_the_side_of_the_region(film, azimuth):
+    pytest.importorskip("viser", reason="viser is not installed")
+    from tauhat.report.view import Viewer
+
+    middle = np.array([0.5 * np.cos(azimuth), 0.5 * np.sin(azimuth), 0.3])
+    region = BoxRegion(lower=middle - 0.1, upper=middle + 0.1, rotation=np.eye(3))
+    viewer = Viewer(film, port=free_port(), outline=region.outline())
+    try:
+        x, y, _ = viewer.server.initial_camera.position
+        assert np.cos(np.arctan2(y, x) - azimuth) > 0.7
+    finally:
         viewer.stop()
 
 

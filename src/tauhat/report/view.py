@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from io import StringIO
 from typing import Any
@@ -19,16 +20,30 @@ _FRAMES_PER_SECOND = 30.0
 _BARS_PER_SECOND = 8.0
 _LINKS = ((125, 176, 238), (95, 108, 128))
 _JOINTS = (217, 101, 27)
+_AWAY, _AZIMUTH = 1.78, 0.666  # of the camera: parts of the reach, [rad] from the x axis or the region
+_REGION, _PATH = (47, 158, 98), (176, 68, 127)
+_REGION_WIDTH, _PATH_WIDTH = 3.0, 1.5  # [px]
 
 
 class Viewer:
-    """A running view of a motion: the scene, its controls, and the time that is shown."""
+    """A running view of a motion: the scene, its controls, and the time that is shown.
 
-    def __init__(self, replay: Replay, *, port: int) -> None:
+    Parameters
+    ----------
+    port : on this machine
+    outline : lines of a region in the base frame, (n, 3) each [m]
+    path : of the tool in the base frame, (n, 3) [m]
+    """
+
+    def __init__(
+        self, replay: Replay, *, port: int, outline: Sequence[FloatArray] = (), path: FloatArray | None = None
+    ) -> None:
         self._replay = replay
         self.server = _server(port)
         self._frames = _scene(self.server.scene, replay)
-        self._server_looks_at(replay.reach)
+        _draw(self.server.scene, "/region", outline, colour=_REGION, width=_REGION_WIDTH)
+        _draw(self.server.scene, "/path", () if path is None else (path,), colour=_PATH, width=_PATH_WIDTH)
+        self._server_looks_at(replay.reach, outline)
         gui = self.server.gui
         gui.configure_theme(show_share_button=False, show_logo=False)
         gui.main_panel.dock_right()
@@ -84,9 +99,13 @@ class Viewer:
         with redirect_stdout(StringIO()):
             self.server.stop()
 
-    def _server_looks_at(self, reach: float) -> None:
-        camera = self.server.initial_camera
-        camera.position = (1.4 * reach, 1.1 * reach, 1.0 * reach)
+    def _server_looks_at(self, reach: float, outline: Sequence[FloatArray]) -> None:
+        """Put the camera beside the arm, on the side where the region is if there is one."""
+        camera, angle = self.server.initial_camera, _AZIMUTH
+        if outline:
+            x, y, _ = np.concatenate(list(outline)).mean(axis=0)
+            angle += float(np.arctan2(y, x))
+        camera.position = (_AWAY * reach * np.cos(angle), _AWAY * reach * np.sin(angle), reach)
         camera.look_at = (0.0, 0.0, 0.1 * reach)
 
 
@@ -126,6 +145,15 @@ def _scene(scene: Any, replay: Replay) -> list[Any]:
             f"/links/{index}/joint", radius=radius, height=2.2 * radius, color=_JOINTS, wxyz=_along(joint.axis)
         )
     return frames
+
+
+def _draw(scene: Any, name: str, lines: Sequence[FloatArray], *, colour: tuple[int, int, int], width: float) -> None:
+    """Draw lines, (n, 3) each [m]."""
+    parts = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
+    if parts:
+        scene.add_line_segments(
+            name, points=np.concatenate(parts), colors=colour, thickness=width, thickness_units="screen"
+        )
 
 
 def _along(direction: FloatArray) -> FloatArray:

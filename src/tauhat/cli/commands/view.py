@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -33,6 +33,16 @@ class Options:
             "--robot", metavar="ROBOT", help="Which robot runs it.", show_default="the built-in one with these joints"
         ),
     ] = None
+    task: Annotated[
+        Path | None,
+        typer.Option(
+            "--task",
+            metavar="TASK.toml",
+            help="Draw the region of this task and the way of the tool as well.",
+            show_default=False,
+            readable=False,
+        ),
+    ] = None
     map_file: MapOption = None
     rows: RowsOption = None
     lock: LockOption = None
@@ -53,7 +63,8 @@ def run(options: Options) -> None:
     recording = read_recording(options.motion, map=options.map_file, rows=options.rows)
     robot = load_robot(options.robot, locked=options.lock) if options.robot else _robot_of(recording)
     film = replay(robot, recording)
-    viewer = Viewer(film, port=options.port)
+    drawn = {} if options.task is None else _drawn(options.task, robot, recording)
+    viewer = Viewer(film, port=options.port, **drawn)
     document = {"url": viewer.url, "robot": robot.name, "seconds": film.duration}
     text = f"{robot.name} runs {options.motion} at\n  {viewer.url}\n(this machine only). Ctrl-C ends it."
     show(document, lambda: [unbroken(text)], as_json=options.as_json)
@@ -61,6 +72,18 @@ def run(options: Options) -> None:
         webbrowser.open(viewer.url)
     with suppress(KeyboardInterrupt):
         viewer.run()
+
+
+def _drawn(task: Path, robot: Robot, recording: Recording) -> dict[str, Any]:
+    """Return the lines of a task's region, and the way of its tool."""
+    from tauhat.excitation.limits import tool_frame
+    from tauhat.excitation.task_design import load_task
+    from tauhat.robots.kinematics import forward_kinematics
+
+    settings = load_task(task, robot)
+    frame = tool_frame(robot, settings.frame).name
+    path = forward_kinematics(robot, recording.q, frame=frame).translation
+    return {"outline": settings.region.outline(), "path": path}
 
 
 def _robot_of(recording: Recording) -> Robot:

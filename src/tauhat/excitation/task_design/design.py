@@ -29,6 +29,7 @@ from tauhat.excitation.waypoints.settings import WaypointSettings
 from tauhat.robots.robot import Robot
 from tauhat.workers import LocalWorkers, Workers
 
+USUAL_SEARCH = GeneticSettings(population=40, generations=40)
 Telling = Callable[[str], None]
 
 
@@ -56,7 +57,7 @@ class TaskSettings:
     tool: ToolLimits = field(default_factory=ToolLimits)
     margin: float = 0.05
     criterion: Criterion = field(default_factory=Mixed)
-    genetic: GeneticSettings = field(default_factory=lambda: GeneticSettings(population=40, generations=40))
+    genetic: GeneticSettings = USUAL_SEARCH
     islands: int = 2
 
     def __post_init__(self) -> None:
@@ -164,7 +165,7 @@ class _Task:
         whole = sum(weights.values())
         known = np.zeros((self.facts.n, self.facts.n))
         for found in before:
-            known += weights[found.stage.name] / whole * found.information
+            known += found.stage.weight * found.recorded / whole * found.information
         counted = self.blocks.of(stage.counted)
         if not counted.size:
             raise ExcitationError(

@@ -40,7 +40,12 @@ class StageDesign:
     @property
     def repeats(self) -> int:
         """How often the program fits into the time of the stage."""
-        return max(1, int(self.stage.seconds // self.motion.duration))
+        return self.stage.runs(self.motion.duration)
+
+    @property
+    def recorded(self) -> float:
+        """How long the program runs in all, at most the time of the stage [s]."""
+        return self.repeats * self.motion.duration
 
     def recording(self, *, rate: float) -> Recording:
         """Return the program run `repeats` times, sampled `rate` times a second, from rest to rest."""
@@ -65,7 +70,7 @@ class TaskDesign:
     def information(self, upto: int | None = None) -> FloatArray:
         """Return the weighted information per reading of the first `upto` stages, all by default, (n, n)."""
         chosen = self.stages[:upto]
-        weights = [found.stage.weight * found.stage.seconds for found in chosen]
+        weights = [found.stage.weight * found.recorded for found in chosen]
         parts = (weight / sum(weights) * found.information for weight, found in zip(weights, chosen, strict=True))
         return np.asarray(sum(parts, start=np.zeros((self.facts.n, self.facts.n))))
 
@@ -79,7 +84,7 @@ class TaskDesign:
 
         The standard error of each times what its column is in random states, over the noise of one reading.
         """
-        readings = READINGS_PER_SECOND * sum(found.stage.seconds for found in self.stages[:upto])
+        readings = READINGS_PER_SECOND * sum(found.recorded for found in self.stages[:upto])
         eigenvalues, axes = np.linalg.eigh(self.information(upto))
         inverse = 1.0 / np.maximum(eigenvalues, _NOTHING * eigenvalues[-1])
         return np.asarray(np.sqrt((axes**2) @ inverse / readings))
@@ -100,6 +105,7 @@ class TaskDesign:
                     "counted": list(found.stage.counted),
                     "duration": found.motion.duration,
                     "repeats": found.repeats,
+                    "recorded": found.recorded,
                     "moves": len(found.motion.moves),
                     "slowed": len(found.motion.slowed),
                     "evaluations": found.evaluations,

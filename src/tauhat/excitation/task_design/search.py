@@ -33,7 +33,7 @@ class StageSearch:
 
     facts : the columns, scaled; its sign is smooth
     known : (n, n) information of the stages before, per reading of all stages
-    share : part of all readings, weighted, that this stage gives
+    share : part of all readings, weighted, that this stage gives when its time is filled
     counted : places of the columns that count
     others : limits of several joints at once
     margin : part of relative limits that is left unused
@@ -61,7 +61,8 @@ class StageSearch:
         least = min((self.room(samples, limit) for limit in self.others), default=0.0)
         if least < 0.0:
             return _OUTSIDE * (2.0 - 1.0 / (1.0 - least))
-        told = told_of(self.known + self.share * self.facts.matrix(samples), self.counted)
+        filled = self.space.stage.runs(motion.duration) * motion.duration / self.space.stage.seconds
+        told = told_of(self.known + self.share * filled * self.facts.matrix(samples), self.counted)
         return self.criterion.of_lifted(np.asarray(np.linalg.eigvalsh(told), dtype=np.float64))[0]
 
     def refusal(self, genes: FloatArray) -> ExcitationError:

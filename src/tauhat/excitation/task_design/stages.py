@@ -15,6 +15,8 @@ MoveKind: TypeAlias = Literal["joint", "line"]
 """How via-points are joined: straight in joint space, or in lines of the tool."""
 
 Range: TypeAlias = tuple[float, float]
+LEAST_RADIUS = 1e-3  # [m] of a zone: a smaller one is a stop
+_PACE_STEP = 0.01  # controllers take whole per cent
 _MOST_POINTS = 100
 
 
@@ -28,6 +30,7 @@ class TaskStage:
     seconds : how long it is recorded; the program is repeated as often as it fits, and must fit once
     speed, acceleration : least and largest part of the limits that a move may ask for, in (0, 1]
     zone : largest part of a way that a fly-by zone takes, 0 to stop at every point
+    radius : largest radius of a zone [m], for controllers that know no parts of a way; zones are parts where not stated
     dwell : how long it stands at the points where it stops [s]
     moves : how points are joined
     weight : of its readings beside those of the other stages, when these are combined
@@ -40,6 +43,7 @@ class TaskStage:
     speed: Range = (0.3, 1.0)
     acceleration: Range = (0.3, 1.0)
     zone: float = LARGEST_PART
+    radius: float | None = None
     dwell: float = 0.0
     moves: MoveKind = "joint"
     weight: float = 1.0
@@ -57,6 +61,10 @@ class TaskStage:
             raise ExcitationError("moves", where=where, expected=" or ".join(get_args(MoveKind)), got=self.moves)
         self._check_pace(where)
 
+    def runs(self, duration: float) -> int:
+        """Return how often a program of this duration [s] fits into the stage's time, at least once."""
+        return max(1, int(self.seconds // duration))
+
     def _check_pace(self, where: str) -> None:
         for name in ("seconds", "weight"):
             if not 0.0 < getattr(self, name) < np.inf:
@@ -64,10 +72,14 @@ class TaskStage:
         for name in ("speed", "acceleration"):
             low, high = (float(value) for value in getattr(self, name))
             object.__setattr__(self, name, (low, high))
-            if not 0.0 < low <= high <= 1.0:
-                raise ExcitationError(name, where=where, expected="parts, 0 < least <= largest <= 1", got=[low, high])
+            if not _PACE_STEP <= low <= high <= 1.0:
+                expected = f"parts, {_PACE_STEP:g} <= least <= largest <= 1"
+                raise ExcitationError(name, where=where, expected=expected, got=[low, high])
         if not 0.0 <= self.zone <= LARGEST_PART:
             raise ExcitationError("zone", where=where, expected=f"a part of a way, 0 to {LARGEST_PART}", got=self.zone)
+        if self.radius is not None and not LEAST_RADIUS <= self.radius < np.inf:
+            expected = f"a length of at least {LEAST_RADIUS:g} m"
+            raise ExcitationError("radius of zones", where=where, expected=expected, got=self.radius)
         if not 0.0 <= self.dwell < np.inf:
             raise ExcitationError("dwell", where=where, expected="a time of at least 0 s", got=self.dwell)
 
