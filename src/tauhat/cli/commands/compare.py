@@ -105,24 +105,24 @@ def run(options: Options) -> None:
     """Identify with several models and estimators, and compare them on recordings that none was fitted to."""
     from tauhat.cli.inputs import read_recordings, robot_of_recordings
     from tauhat.estimation.estimators import check_simulating
-    from tauhat.studies import compare_sets
+    from tauhat.studies import FittedSet, compare_sets
 
     if options.controller is not None:
         check_simulating(options.estimators or _ESTIMATORS)
     with working("reading"):
-        logs, task = (
-            read_recordings(paths, map_file=options.map_file, rows=options.rows)
-            for paths in (options.logs, options.task or [])
-        )
+        logs = [*options.logs, *(options.task or [])]
+        fitted = read_recordings(logs, map_file=options.map_file, rows=options.rows)
         unseen_map = options.unseen_map or options.map_file
         judged = read_recordings(options.unseen, map_file=unseen_map, rows=options.unseen_rows)
-        robot = robot_of_recordings(options.robot, (*logs, *task, *judged), locked=options.lock)
-    candidates = _candidates(robot, (*logs, *task), options)
-    sets = {"global": logs, "task": task, "both": (*logs, *task)} if task else {"": logs}
-    with working("comparing"):
-        result = compare_sets(
-            candidates, sets, judged, cutoff=options.cutoff, tell=lambda name: say("identifying", name)
+        robot = robot_of_recordings(options.robot, (*fitted, *judged), locked=options.lock)
+    sets = [
+        FittedSet(
+            name=name, recordings=fitted[part], candidates=_candidates(robot, fitted[part], logs[part], options)
         )
+        for name, part in _parts(options).items()
+    ]  # fmt: skip
+    with working("comparing"):
+        result = compare_sets(sets, judged, cutoff=options.cutoff, tell=lambda name: say("identifying", name))
     document = result.to_dict()
     if options.output is not None:
         from tauhat.report.page import write_comparison
@@ -132,7 +132,15 @@ def run(options: Options) -> None:
     show(document, lambda: _view(result, options), as_json=options.as_json)
 
 
-def _candidates(robot: Robot, fitted: tuple[Recording, ...], options: Options) -> list[Candidate]:
+def _parts(options: Options) -> dict[str, slice]:
+    """Return which of the logs and those of the task models are fitted to, by the name of the part."""
+    if not options.task:
+        return {"": slice(None)}
+    count = len(options.logs)
+    return {"global": slice(count), "task": slice(count, None), "both": slice(None)}
+
+
+def _candidates(robot: Robot, fitted: tuple[Recording, ...], logs: list[Path], options: Options) -> list[Candidate]:
     """Return every model with every estimator, models in the outer loop."""
     from tauhat.studies.comparison import candidate_named
 
@@ -141,17 +149,15 @@ def _candidates(robot: Robot, fitted: tuple[Recording, ...], options: Options) -
         for model in options.models or ["plain", "robust"]
         for estimator in options.estimators or _ESTIMATORS
     ]
-    return candidates if options.controller is None else _driven(candidates, robot, options)
+    return candidates if options.controller is None else _driven(candidates, robot, logs, options)
 
 
-def _driven(candidates: list[Candidate], robot: Robot, options: Options) -> list[Candidate]:
+def _driven(candidates: list[Candidate], robot: Robot, logs: list[Path], options: Options) -> list[Candidate]:
     """Return the candidates, the simulating ones with the controller of the fitted logs."""
     from tauhat.cli.inputs import loop_of, sources_of
     from tauhat.estimation.estimators import SIMULATING, estimator_named
 
-    sources = sources_of(
-        [*options.logs, *(options.task or [])], map_file=options.map_file, rows=options.rows, period=None
-    )
+    sources = sources_of(logs, map_file=options.map_file, rows=options.rows, period=None)
     loop = loop_of(options.controller, robot, sources)
     return [
         replace(candidate, estimator=estimator_named(candidate.estimator.key, loop=loop))
