@@ -7,9 +7,11 @@ import pinocchio
 
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.passive_kernel import ELEMENT
+from tauhat.dynamics.terms import Thermal
 from tauhat.robots import Robot, load_robot
 from tauhat.robots.kinematics import pinocchio_model
 from tauhat.sensing.sensed_model import SensedModel
+from tauhat.sensing.thermal import SensedHeat
 
 RATE = 1000.0
 
@@ -20,6 +22,7 @@ def frictionless(name: str = "panda") -> SensedModel:
     return SensedModel(
         robot=robot, inertia=robot.inertia, rotor=np.zeros(robot.n_v), sliding=nothing, bristles=nothing,
         rms=np.full(robot.n_v, 0.1), slow=np.full(robot.n_v, 0.02),
+        heat=SensedHeat(term=Thermal(), slopes=np.zeros((robot.n_v, 2))),
     )  # fmt: skip
 
 

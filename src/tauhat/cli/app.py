@@ -27,6 +27,7 @@ from tauhat.cli.commands import (
     report,
     robots,
     run,
+    sense,
     simulate,
     study,
     verify,
@@ -56,6 +57,7 @@ app.command("identify")(as_command(identify.run, identify.Options))
 app.command("verify")(as_command(verify.run, verify.Options))
 app.command("payload")(as_command(payload.run, payload.Options))
 app.command("calibrate-drives")(as_command(calibrate_drives.run, calibrate_drives.Options))
+app.command("sense")(as_command(sense.run, sense.Options))
 app.command("compare")(as_command(compare.run, compare.Options))
 app.command("study")(as_command(study.run, study.Options))
 app.command("report")(as_command(report.run, report.Options))

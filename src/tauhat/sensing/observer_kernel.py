@@ -12,12 +12,14 @@ The observers smooth e, each exact for the sample time (tau_ext constant between
     3 sliding mode         super-twisting on p, implicit, so that it does not chatter; then as 1
     4 disturbance          tau' = X^-1 M^-1 (M y'' + b + sliding - T - tau), implicit, without y''
     5 Kalman               p+ = p + h (drive + d), d+ = phi d, corrected by the measured p with constant gains
+    6 thermal              1, with friction that warms up beside it (`thermal_kernel`)
 The variance adds the model's error, `rms^2`, and what is not known of the bristles: `(weight load)^2 P`, with
 `P+ = P exp(-2 |moved| / w) + P_slid (1 - exp(-2 |moved| / w))`, and no less than `P_turned` behind a reversal.
 
 `rows` is the memory, (ROWS, n_v): 0 position as measured (nan at the start), 1-2 y, y', 3-4 T, T', 5 u, 6 p, 7 drive,
-8-10 the observer's own, 11 load, 12 direction. `bent` (2, n_bristles): states and their variances. `plan` is the
-filter's 10 numbers, the observer's gains (n_v, 6), the model's error rms (n_v,); kind, h, P_start, P_turned, P_slid.
+8-10 the observer's own, 11 load, 12 direction, 13-20 warmth (6 alone). `bent` (2, n_bristles): states and their
+variances. `plan` is the filter's 10 numbers, the observer's gains (n_v, 6), the model's error rms (n_v,); kind, h,
+P_start, P_turned, P_slid; and `heat` of `thermal_kernel`, empty but for 6.
 Filled: `out` (5, n_v): tau_ext, its variance, y, y', e.
 
 Sources: De Luca and Mattone 2003 (1); Mohammadi et al. 2013 (4); Garofalo et al. 2019 (3); Wahrburg et al. 2018 (5);
@@ -32,9 +34,10 @@ from numba import njit
 from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved, sweep_outward
 from tauhat.dynamics.momentum_kernel import momentum_kernel
 from tauhat.dynamics.passive_kernel import bent_by, passive_kernel
+from tauhat.sensing.thermal_kernel import add_warm_friction, feel_warmth, follow_warmth
 
-INVERSE, FIRST, SECOND, SLIDING, DISTURBANCE, KALMAN = range(6)
-ROWS, SCRATCH = 13, 9
+INVERSE, FIRST, SECOND, SLIDING, DISTURBANCE, KALMAN, THERMAL = range(7)
+ROWS, SCRATCH = 21, 9
 _ACCELERATION, _BIAS, _RIGID, _FRICTION, _MOMENTUM, _DRIVE = 0, 1, 2, 3, 6, 8  # rows of scratch
 
 
@@ -45,13 +48,17 @@ def observe(body, plan, sample, memory, out):  # type: ignore[no-untyped-def]
     `memory` is rows, bent, work (SCRATCH, n_v), link work (40 n_v,), mass (n_v, n_v). Only the disturbance observer can
     fail, where the mass matrix is that of no body.
     """
-    numbers, gains, rms, rest = plan
+    numbers, gains, rms, rest, heat = plan
     rows, bent, work, links_work, mass = memory
     if np.isnan(rows[0, 0]):
         _begin(sample, rest[2], rows, bent)
+    if rest[0] == THERMAL:
+        feel_warmth(heat, numbers, sample[0], rows)
     _bend(body[4], sample[0], rest, rows, bent)
     _filtered(body[4], numbers, sample, (rows, bent), work[_ACCELERATION])
     _modelled(body, rows, work, links_work, mass)
+    if rest[0] == THERMAL:
+        add_warm_friction(rows, work[_FRICTION])
     _pushed(rest, rows, work, out[4])
     if rest[0] == INVERSE:
         for i in range(rows.shape[1]):
@@ -63,6 +70,8 @@ def observe(body, plan, sample, memory, out):  # type: ignore[no-untyped-def]
         return _disturbance(gains, (body[2], rest[1]), (mass, work), rows, out[0])
     for i in range(rows.shape[1]):
         out[0, i] = _smoothed(int(rest[0]), gains[i], rest[1], (out[4, i], work[_DRIVE, i]), rows[:, i])
+    if rest[0] == THERMAL:
+        follow_warmth(rms, heat, rows, out)
     return True
 
 
@@ -153,7 +162,7 @@ def _filtered(bristles, numbers, sample, states, acceleration):  # type: ignore[
 def _smoothed(kind, gain, h, pushed, row):  # type: ignore[no-untyped-def]
     """Return the external torque of one joint by an observer that sees each joint alone; `pushed` is e, mean drive."""
     e, drive = pushed
-    if kind in (INVERSE, FIRST):
+    if kind in (INVERSE, FIRST, THERMAL):
         row[8] = gain[0] * row[8] + (1.0 - gain[0]) * e
         return row[8]
     if kind == SECOND:

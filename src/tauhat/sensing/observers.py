@@ -5,12 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from tauhat.arrays import FloatArray
+from tauhat.arrays import FloatArray, read_only
+from tauhat.dynamics.terms.presliding import LENGTHS
 from tauhat.errors import SensingError
 from tauhat.robots.naming import advice_on_name
 from tauhat.sensing import observer_kernel as kernel
@@ -22,6 +23,10 @@ N_GAINS = 6
 _SECOND_ORDER = 1.678 / np.log(2.0)
 _BUTTERWORTH = 1.43 / np.log(2.0)
 _CRITICAL = 1.5  # k1 of the super-twisting law in parts of the root of k2
+
+
+HeatPlan: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""Numbers of the joints, slopes of friction, slow speeds and settings, as `thermal_kernel` reads them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +50,10 @@ class Observer(ABC):
         own = self._own(model, step)
         gains[:, : own.shape[-1]] = own
         return gains
+
+    def heat(self, model: SensedModel, step: float) -> HeatPlan:  # noqa: ARG002
+        """Return what `thermal_kernel` reads where the observer follows the warmth of the joints; else empty."""
+        return read_only(np.zeros((0, 5))), read_only(np.zeros((0, 2))), read_only(np.zeros(0)), read_only(np.zeros(0))
 
     @abstractmethod
     def _own(self, model: SensedModel, step: float) -> FloatArray:
@@ -148,6 +157,57 @@ class KalmanObserver(Observer):
         return np.array([kept[0], kept[1], 1.0])
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThermalObserver(MomentumObserver):
+    """The momentum observer with the warmth of every joint beside it, and what is not known of friction in the error.
+
+    The warmth runs along, heated by the model's friction; it is corrected by the external torque while nothing touches
+    the arm, and left alone in contact. Its variance widens that of the torque. Needs an estimate with a thermal term.
+
+    start, spread : warmth at the first sample and its standard deviation; 1 is what a joint's typical speed would bring
+    wander : standard deviation of the warmth's model, in a long time without correction
+    correlation : time over which errors of the model are alike [s]
+    limit : standard deviations of external torque within which the arm counts as free
+    hold : how long, before the warmth is corrected [s]
+    """
+
+    key: ClassVar[str] = "thermal"
+    kind: ClassVar[int] = kernel.THERMAL
+    start: float = 0.5
+    spread: float = 0.7
+    wander: float = 0.15
+    correlation: float = 1.0
+    limit: float = 3.0
+    hold: float = 0.5
+
+    def __post_init__(self) -> None:
+        super(ThermalObserver, self).__post_init__()
+        for name in ("spread", "wander", "correlation", "limit", "hold"):
+            value = getattr(self, name)
+            if not 0.0 < value < np.inf:
+                raise SensingError(f"{name} of an observer", where=self.key, expected="above zero", got=value)
+        if not np.isfinite(self.start):
+            raise SensingError("start of an observer", where=self.key, expected="a number", got=self.start)
+
+    def heat(self, model: SensedModel, step: float) -> HeatPlan:
+        """Return what `thermal_kernel` reads.
+
+        Raises
+        ------
+        SensingError
+            when the model's friction does not warm up.
+        """
+        if model.heat is None:
+            raise SensingError(
+                "the estimate does not know how friction warms up", where=f"observer {self.key}",
+                expected="one with the term thermal",
+                remedy="identify a warm-up recording with --model plain,thermal, or take another observer",
+            )  # fmt: skip
+        alike = max(1.0, 2.0 * self.correlation / step)
+        settings = [self.start, self.spread**2, self.wander**2, alike, self.limit, self.hold, step, LENGTHS[0]]
+        return read_only(model.heat.numbers(step)), model.heat.slopes, model.slow, read_only(np.array(settings))
+
+
 OBSERVERS: Mapping[str, type[Observer]] = {
     kind.key: kind
     for kind in (
@@ -157,6 +217,7 @@ OBSERVERS: Mapping[str, type[Observer]] = {
         SlidingModeObserver,
         DisturbanceObserver,
         KalmanObserver,
+        ThermalObserver,
     )
 }
 """All observers by name; the first is the default."""

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, frozen, read_only
+from tauhat.control.model_torque import model_torque
 from tauhat.dynamics.base import random_motion
 from tauhat.dynamics.forward import Masses, rotor_mass_matrix
 from tauhat.dynamics.passive_kernel import DAHL, ELEMENT, LOAD_DAHL
 from tauhat.dynamics.tree import kernel_tree
 from tauhat.errors import ModelError, SensingError
 from tauhat.estimation.estimate import Estimate
-from tauhat.estimation.identified_torque import identified_torque
+from tauhat.robots.naming import advice_on_name
 from tauhat.robots.robot import Robot
+from tauhat.sensing.thermal import SensedHeat, parted
 
 _STRENGTH = 100.0
 _STATES, _SEED = 100, 20240229
@@ -34,6 +36,7 @@ class SensedModel:
     bristles : friction with a memory of the displacement; its states follow the position as measured
     rms : (n_v,) of the model's error where the joint moves [Nm or N]
     slow : (n_v,) speed below which a joint counts as standing [rad/s or m/s]
+    heat : how friction changes with the warmth of the joints; None: it does not
     """
 
     robot: Robot
@@ -43,6 +46,7 @@ class SensedModel:
     bristles: NDArray[np.void]
     rms: FloatArray
     slow: FloatArray
+    heat: SensedHeat | None = None
 
     def __post_init__(self) -> None:
         n_v = self.robot.n_v
@@ -53,6 +57,8 @@ class SensedModel:
             if elements.dtype != ELEMENT:
                 raise ModelError(f"{name} of a sensed model", expected="elements of friction", got=elements.dtype)
             object.__setattr__(self, name, read_only(elements))
+        if self.heat is not None and len(self.heat.slopes) != n_v:
+            raise SensingError("heat of a sensed model", expected=f"{n_v} joints", got=len(self.heat.slopes))
         if not ((self.rms > 0.0).all() and (self.slow > 0.0).all()):
             raise SensingError("errors and slow speeds of a model", expected="above zero", got=self.rms.tolist())
 
@@ -74,6 +80,30 @@ class SensedModel:
         masses = rotor_mass_matrix(self.robot, q, masses=Masses(self.inertia, self.rotor))
         return np.asarray(masses.diagonal(axis1=1, axis2=2).mean(axis=0))
 
+    def carrying(self, body: FloatArray, link: str = "") -> SensedModel:
+        """Return the model with a tool or payload on the link of a joint; a negative one is taken off.
+
+        Parameters
+        ----------
+        body : (10,) `m, mx, my, mz, Ixx, Ixy, Iyy, Ixz, Iyz, Izz` about the origin of the joint's frame
+        link : name of the joint; the last one by default
+
+        Raises
+        ------
+        SensingError
+            when there is no such joint.
+        """
+        names = self.robot.joint_names
+        joint = link or names[-1]
+        if joint not in names:
+            raise SensingError(
+                "no such link for a tool", expected=", ".join(names), got=joint[:60],
+                remedy=advice_on_name(joint, names),
+            )  # fmt: skip
+        inertia = self.inertia.copy()
+        inertia[names.index(joint)] += frozen("body", body, (10,), where="tool")
+        return replace(self, inertia=inertia)
+
     def body(self) -> tuple[NDArray[Any], ...]:
         """Links, inertia, rotor, sliding elements and bristles, as the kernels read them."""
         return kernel_tree(self.robot).links, self.inertia, self.rotor, self.sliding, self.bristles
@@ -82,12 +112,15 @@ class SensedModel:
 def sensed_model(estimate: Estimate) -> SensedModel:
     """Return an estimate as an observer reads it.
 
+    Friction that warms up is that of the beginning of the fitted recording; what it becomes is in `heat`.
+
     Raises
     ------
     ModelError
         when a term has no value at a single state: gas springs and motors that turn with two joints.
     """
-    torque = identified_torque(estimate)
+    parts = parted(estimate)
+    torque = model_torque(parts.model, parts.standard)
     remembered = np.isin(torque.elements["kind"], (DAHL, LOAD_DAHL))
     tops = np.ones(torque.n_v) if estimate.top_speeds is None else estimate.top_speeds
     return SensedModel(
@@ -98,4 +131,5 @@ def sensed_model(estimate: Estimate) -> SensedModel:
         bristles=torque.elements[remembered],
         rms=np.maximum(estimate.joint_rms, np.finfo(float).tiny),
         slow=_STANDING * np.maximum(tops, np.finfo(float).tiny),
+        heat=parts.heat,
     )

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from tauhat.arrays import FloatArray, frozen, read_only
 from tauhat.errors import SensingError
 from tauhat.sensing.causal_filter import CausalFilter
-from tauhat.sensing.observer_kernel import ROWS, SCRATCH, observe
-from tauhat.sensing.observers import MomentumObserver, Observer
+from tauhat.sensing.observer_kernel import ROWS, SCRATCH, THERMAL, observe
+from tauhat.sensing.observers import HeatPlan, MomentumObserver, Observer
 from tauhat.sensing.sensed_model import SensedModel
+from tauhat.sensing.thermal_kernel import SAID, VARIANCE, WARMTH
 
 _OUT = 5
+_SAID = {None: 0.0, True: 1.0, False: -1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +62,16 @@ class SensedTorque(NamedTuple):
     raw: FloatArray
 
 
+class SensedWarmth(NamedTuple):
+    """Warmth of the joints of one sample or of many, (n_v,) or (n_t, n_v), and its variance.
+
+    Zero where the fitted recording began, one what a joint's typical speed would bring (`dynamics.thermal_kernel`).
+    """
+
+    theta: FloatArray
+    variance: FloatArray
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TorqueObserver:
     """A model, an observer and a sample rate: pure steps, and the same along a recording.
@@ -75,7 +87,7 @@ class TorqueObserver:
     observer: Observer = field(default_factory=MomentumObserver)
     cutoff: float = 10.0
     doubt: BristleDoubt = field(default_factory=BristleDoubt)
-    _plan: tuple[FloatArray, FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
+    _plan: tuple[FloatArray, FloatArray, FloatArray, FloatArray, HeatPlan] = field(init=False, repr=False)
     _body: tuple[NDArray[Any], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -84,23 +96,33 @@ class TorqueObserver:
         doubt = self.doubt
         rest = read_only(np.array([self.observer.kind, self.step, doubt.start, doubt.turned, doubt.slid]))
         object.__setattr__(self, "_body", self.model.body())
-        object.__setattr__(self, "_plan", (numbers, gains, self.model.rms, rest))
+        object.__setattr__(
+            self, "_plan", (numbers, gains, self.model.rms, rest, self.observer.heat(self.model, self.step))
+        )
 
     @property
     def n_v(self) -> int:
         """Number of joints."""
         return self.model.n_v
 
+    @property
+    def parts(self) -> tuple[Any, Any]:
+        """Body and plan, as the kernel `observe` takes them."""
+        return self._body, self._plan
+
     def start(self) -> ObserverMemory:
         """Return the memory before the first sample."""
         return ObserverMemory(np.full((ROWS, self.n_v), np.nan), np.zeros((2, self.model.bristles.size)))
 
-    def advance(self, memory: ObserverMemory, q: FloatArray, tau: FloatArray) -> tuple[ObserverMemory, SensedTorque]:
+    def advance(
+        self, memory: ObserverMemory, q: FloatArray, tau: FloatArray, *, free: bool | None = None
+    ) -> tuple[ObserverMemory, SensedTorque]:
         """Return the memory behind a sample and the external torque, (n_v,).
 
         Parameters
         ----------
         q, tau : (n_v,) position and motor torque, joint side, as measured [rad or m, Nm or N]
+        free : whether nothing touches the arm, for an observer that learns then; its own rule decides by default
 
         Raises
         ------
@@ -108,30 +130,54 @@ class TorqueObserver:
             when the observer needs a mass matrix of a body, and the model has none here.
         """
         after = ObserverMemory(memory.rows.copy(), memory.bent.copy())
+        after.rows[SAID] = _SAID[free]
         sample, out = np.stack([q, tau]), np.empty((_OUT, self.n_v))
         if not observe(self._body, self._plan, sample, (*after, *_scratch(self.n_v)), out):
             raise self._no_body()
         return after, SensedTorque(*out)
 
-    def along(self, q: FloatArray, tau: FloatArray) -> SensedTorque:
+    def warmth(self, memory: ObserverMemory) -> SensedWarmth:
+        """Return the warmth of the joints behind a sample; nan by an observer that follows none."""
+        return SensedWarmth(memory.rows[WARMTH].copy(), memory.rows[VARIANCE].copy())
+
+    def along(self, q: FloatArray, tau: FloatArray, *, free: NDArray[np.bool_] | None = None) -> SensedTorque:
         """Return the external torque along consecutive samples, (n_t, n_v); causal: a row knows none after it.
 
         Parameters
         ----------
         q, tau : (n_t, n_v) `step` seconds apart
+        free : (n_t,) as in `advance`
 
         Raises
         ------
         SensingError
             as `advance`.
         """
+        out, _ = self._along(q, tau, free)
+        return SensedTorque(*(np.ascontiguousarray(out[:, index]) for index in range(_OUT)))
+
+    def warmth_along(self, q: FloatArray, tau: FloatArray, *, free: NDArray[np.bool_] | None = None) -> SensedWarmth:
+        """Return the warmth of the joints behind each of consecutive samples; parameters as `along`.
+
+        Raises
+        ------
+        SensingError
+            as `advance`, and when the observer follows no warmth.
+        """
+        if self.observer.kind != THERMAL:
+            raise SensingError("the observer follows no warmth", expected="thermal", got=self.observer.key)
+        _, warm = self._along(q, tau, free)
+        return SensedWarmth(np.ascontiguousarray(warm[:, 0]), np.ascontiguousarray(warm[:, 1]))
+
+    def _along(self, q: FloatArray, tau: FloatArray, free: NDArray[np.bool_] | None) -> tuple[FloatArray, FloatArray]:
+        """Return what the kernel fills, (n_t, 5, n_v), and warmth and variance behind it, (n_t, 2, n_v)."""
         position = frozen("q", q, (None, self.n_v), where="sensing")
         torque = frozen("tau", tau, (len(position), self.n_v), where="sensing")
-        out = np.empty((len(position), _OUT, self.n_v))
-        memory = self.start()
-        if not _observe_along(self._body, self._plan, (position, torque), (*memory, *_scratch(self.n_v)), out):
+        out, warm = np.empty((len(position), _OUT, self.n_v)), np.empty((len(position), 2, self.n_v))
+        memory, samples = self.start(), (position, torque, _said(free, len(position)))
+        if not _observe_along(self._body, self._plan, samples, (*memory, *_scratch(self.n_v)), (out, warm)):
             raise self._no_body()
-        return SensedTorque(*(np.ascontiguousarray(out[:, index]) for index in range(_OUT)))
+        return out, warm
 
     def _no_body(self) -> SensingError:
         return SensingError(
@@ -144,11 +190,26 @@ def _scratch(n_v: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     return np.empty((SCRATCH, n_v)), np.empty(40 * n_v), np.empty((n_v, n_v))
 
 
+def _said(free: NDArray[np.bool_] | None, n_t: int) -> FloatArray:
+    """Return what the caller says of contact, as `thermal_kernel` has it, (n_t,)."""
+    if free is None:
+        return np.zeros(n_t)
+    flags = np.asarray(free)
+    if flags.dtype != np.bool_ or flags.shape != (n_t,):
+        raise SensingError(
+            "samples that are free", expected=f"{n_t} of true or false", got=f"{flags.shape} of {flags.dtype}"
+        )
+    return np.where(flags, 1.0, -1.0)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _observe_along(body, plan, samples, memory, out):  # type: ignore[no-untyped-def]
-    sample = np.empty((2, memory[0].shape[1]))
+def _observe_along(body, plan, samples, memory, filled):  # type: ignore[no-untyped-def]
+    rows, sample = memory[0], np.empty((2, memory[0].shape[1]))
+    out, warm = filled
     for k in range(out.shape[0]):
         sample[0], sample[1] = samples[0][k], samples[1][k]
+        rows[SAID] = samples[2][k]
         if not observe(body, plan, sample, memory, out[k]):
             return False
+        warm[k, 0], warm[k, 1] = rows[WARMTH], rows[VARIANCE]
     return True

@@ -110,6 +110,11 @@ class WrenchSolver:
         sizes = np.repeat(self.largest, 3)
         object.__setattr__(self, "_spread", read_only(1.0 / np.linalg.norm(directions / sizes[:, None], axis=0)))
 
+    @property
+    def task(self) -> tuple[Any, ...]:
+        """Links, place, directions, largest wrench and whether directions turn with the frame, for kernels."""
+        return self._links, self._place, self.directions, self._spread, self.axes == "frame"
+
     def jacobian(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the Jacobian of the frame's origin in base axes, (6, n_v), and the frame's rotation, (3, 3)."""
         n_v = self.robot.n_v
@@ -140,8 +145,7 @@ class WrenchSolver:
         if not (spread > 0.0).all():
             raise SensingError("variance of external torque", expected="above zero", got=float(spread.min()))
         solved = np.empty((len(rows[0]), 1 + self._spread.size, self._spread.size))
-        task = (self._links, self._place, self.directions, self._spread, self.axes == "frame")
-        _along(task, rows[0], (rows[1], spread), solved)
+        _along(self.task, rows[0], (rows[1], spread), solved)
         wrench = solved[:, 0] @ self.directions.T
         covariance = self.directions @ solved[:, 1:] @ self.directions.T
         return SensedWrench(wrench, covariance)

@@ -52,6 +52,13 @@ class Options:
     map_file: MapOption = None
     cutoff: CutoffOption = None
     rows: RowsOption = None
+    warm_start: Annotated[
+        float | None,
+        typer.Option(
+            "--warm-start", metavar="SECONDS", show_default=False,
+            help="Tell from the first seconds of the log how warm the joints are, and judge the rest (term thermal).",
+        ),
+    ] = None  # fmt: skip
     residuals: Annotated[
         bool, typer.Option("--residuals", help="Search the residuals for effects that the model does not have.")
     ] = False
@@ -95,11 +102,27 @@ def run(options: Options) -> None:
     processing = processing_of(estimate, cutoff=options.cutoff)
     with working("predicting"):
         recordings = recordings_of_estimate(estimate, options.logs, map_file=options.map_file, rows=options.rows)
+        if options.warm_start is not None:
+            estimate, recordings = _warm_started(estimate, recordings, options.warm_start)
         verification = verify(estimate, recordings, processing=processing)
     parts = [_Part(verification.to_dict(), verification_view(verification))]
     parts += _further(estimate, recordings, processing, options)
     document = {key: value for part in parts for key, value in part.document.items()}
     show(document, lambda: (line for part in parts for line in part.lines), as_json=options.as_json)
+
+
+def _warm_started(
+    estimate: Estimate, recordings: tuple[Recording, ...], seconds: float
+) -> tuple[Estimate, tuple[Recording, ...]]:
+    """Return the estimate as warm as the robot is behind the first seconds of a log, and the rest of the log."""
+    from tauhat.estimation.warm_start import warm_start
+
+    if len(recordings) != 1:
+        raise typer.BadParameter("--warm-start takes one log at a time: each begins at another warmth")
+    found = warm_start(estimate, recordings[0], seconds=seconds)
+    if found.rest is None:
+        raise typer.BadParameter(f"nothing of the log is left behind its first {seconds:g} s")
+    return found.later, (found.rest,)
 
 
 class _Part(NamedTuple):

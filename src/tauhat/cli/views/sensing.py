@@ -1,0 +1,49 @@
+"""What was sensed along a log, as tables and a sentence on what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from tauhat.cli.views.tables import aligned, table
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from tauhat.sensing.sensed_log import SensedLog
+
+_UNITS = ("N", "N", "N", "Nm", "Nm", "Nm")
+
+
+def sensing_view(log: SensedLog) -> Iterator[RenderableType]:
+    """Yield external torque and wrench with their typical error bars, and what became of the samples."""
+    data = log.to_dict()
+    units = ["N" if name in log.prismatic else "Nm" for name in log.joint_names]
+    yield _sizes(f"{log.name}: external torque", data["joints"], units, "joint")
+    asked = [(part, unit) for part, unit, seen in zip(data["wrench"], _UNITS, log.solved, strict=True) if seen]
+    where = f"Wrench at {log.frame}, axes of the {log.axes}"
+    yield _sizes(where, [part for part, _ in asked], [unit for _, unit in asked], "component")
+    yield _sentence(log)
+
+
+def _sizes(title: str, parts: list[dict[str, float]], units: list[str], what: str) -> RenderableType:
+    from rich.markup import escape
+
+    made = table(title, (what, "unit"), ("rms", "peak", "± there", "usually ±"))
+    sizes = [part["std"] for part in parts]
+    columns = [aligned([part[key] for part in parts], like=sizes) for key in ("rms", "peak", "peak_std", "std")]
+    for part, unit, *figures in zip(parts, units, *columns, strict=True):
+        made.add_row(escape(str(part["name"])), unit, *figures)
+    return made
+
+
+def _sentence(log: SensedLog) -> RenderableType:
+    from rich.text import Text
+
+    counts = log.counts
+    skipped = {"late": counts.late, "repeated": counts.repeated, "not finite": counts.not_finite}
+    said = ", ".join(f"{count} {name}" for name, count in skipped.items() if count) or "none"
+    return Text(
+        f"{log.n_t} samples at {1.0 / log.step:.6g} Hz; skipped: {said}; started again {counts.restarts} times.\n"
+        f"± is one standard error. {log.n_t - int(log.settled.sum())} samples behind starts are not in the tables.\n"
+    )

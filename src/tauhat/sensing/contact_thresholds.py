@@ -1,0 +1,354 @@
+"""What free motion shows without contact, condition by condition: the thresholds above which something touches the arm.
+
+Per joint and condition (settling after a motion, resting, steps of the joint's own speed) the size of the residual in
+free motion is a root mean square, `scale`. A threshold is `level x scale`, with one level per kind of condition, learnt
+on the largest residual of each block of time:
+    a rate of r alarms an hour allows  p = r block / 3600 alarms a block, shared by the three kinds
+    level = the k-th smallest of the n maxima,  k = ceil((n + 1)(1 - p / 3))
+which exceeds the maximum of a new block with probability p / 3 at most, whatever the distribution, if blocks are
+exchangeable (split conformal prediction). Where k > n the free motion is too short for the rate: the level is then the
+largest of all times a margin, which promises nothing but what it is.
+
+Source: Vovk, Gammerman, Shafer, "Algorithmic learning in a random world", 2005.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, IntArray, frozen
+from tauhat.errors import SensingError, TauhatError, TauhatWarning
+from tauhat.files import read_text, write_text
+from tauhat.plain_data import without_infinities
+from tauhat.recordings.log import Log
+from tauhat.recordings.recording import Recording
+from tauhat.sensing.contact_kernel import MOVING, RESTING, ROWS, SETTLING, STATES, judge_along
+from tauhat.sensing.sensed_log import SensedLog
+from tauhat.sensing.sensor import ForceSensor
+from tauhat.sensing.zero import StandingZero
+
+CONDITIONS = ("settling", "resting", "moving")
+SCHEMA, SCHEMA_VERSION = "tauhat/contact-thresholds", 1
+_STEPS = (0.3, 1.0)  # of each joint's top speed in free motion, where steps of its scale end
+_FEWEST = 0.5  # seconds of a condition that give a scale of its own
+_HOUR = 3600.0
+_OUT_OF_REACH = 1e12  # limits with which nothing counts as contact, as is known of free motion
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactRules:
+    """How contact is told from free motion; learning and detecting share them.
+
+    release : part of the threshold below which a contact ends
+    settle : standing for less, the arm settles: friction and controller creep for a while [s]
+    quiet : at the start of a log nothing is told for so long [s]
+    zero : what is taken off
+    block : length of the blocks whose maxima count [s]; longer than a residual remembers
+    margin : on the largest residual, where free motion is too short for the rate
+    least : no threshold is below so many standard errors that the sensor states; short pauses look too quiet
+    """
+
+    release: float = 0.7
+    settle: float = 1.5
+    quiet: float = 0.5
+    zero: StandingZero = field(default_factory=StandingZero)
+    block: float = 2.0
+    margin: float = 1.1
+    least: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.release <= 1.0:
+            raise SensingError("release of a contact", expected="above 0, at most 1", got=self.release)
+        if not (min(self.settle, self.quiet, self.least) >= 0.0 and self.block > 0.0 and self.margin >= 1.0):
+            raise SensingError(
+                "rules of contact", expected="settle, quiet, least of at least 0, block above 0, margin of at least 1",
+                got=f"{self.settle}, {self.quiet}, {self.least}, {self.block}, {self.margin}",
+            )  # fmt: skip
+
+    def way(self, step: float) -> FloatArray:
+        """Return the numbers that the kernel reads, (7,), for samples `step` seconds apart."""
+        zero = self.zero
+        return np.array([self.release, step, self.settle, zero.seconds, zero.fade, zero.follow, self.quiet])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactThresholds:
+    """Limits of the external torque in free motion, in standard errors that the sensor states.
+
+    joint_names : of the columns
+    edges : (n_steps, n_v) speeds at which steps end; the first tells standing, the last is the top speed of free motion
+    limits : (2 + n_steps, n_v) settling, resting, then steps of speed
+    rules : they were learnt with
+    rate : false alarms an hour that were asked for
+    promised : false alarms an hour that this much free motion can promise; above `rate` where it is too short
+    seconds : (3,) of free motion settling, resting and moving
+    spread : largest residual of one recording over that of the others; nan with a single one
+    """
+
+    joint_names: tuple[str, ...]
+    edges: FloatArray
+    limits: FloatArray
+    rules: ContactRules
+    rate: float
+    promised: float
+    seconds: FloatArray
+    spread: float
+
+    def __post_init__(self) -> None:
+        n_v, where = len(self.joint_names), "contact thresholds"
+        edges = frozen("edges", self.edges, (None, n_v), where=where)
+        object.__setattr__(self, "joint_names", tuple(self.joint_names))
+        object.__setattr__(self, "edges", edges)
+        object.__setattr__(self, "limits", frozen("limits", self.limits, (2 + len(edges), n_v), where=where))
+        object.__setattr__(self, "seconds", frozen("seconds", self.seconds, (len(CONDITIONS),), where=where))
+        if not ((self.limits > 0.0).all() and (edges > 0.0).all() and (np.diff(edges, axis=0) >= 0.0).all()):
+            raise SensingError("thresholds of contact", expected="above zero, speeds increasing")
+
+    @property
+    def n_v(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+    @property
+    def keeps_rate(self) -> bool:
+        """Whether the free motion was long enough for the rate that was asked for."""
+        return self.promised <= self.rate
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data in the form of the file."""
+        data = {
+            "schema": SCHEMA, "schema_version": SCHEMA_VERSION, "joint_names": list(self.joint_names),
+            "edges": self.edges.tolist(), "limits": self.limits.tolist(), "rules": asdict(self.rules),
+            "rate": self.rate, "promised": self.promised, "keeps_rate": self.keeps_rate,
+            "seconds": dict(zip(CONDITIONS, self.seconds.tolist(), strict=True)),
+            "spread": self.spread,
+        }  # fmt: skip
+        return dict(without_infinities(data))
+
+    def save(self, path: str | Path) -> None:
+        """Write the thresholds as JSON; the file appears whole or not at all.
+
+        Raises
+        ------
+        OutputError
+            when it cannot be written.
+        """
+        write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False))
+
+
+def load_contact_thresholds(path: str | Path) -> ContactThresholds:
+    """Return the thresholds in a file, exactly as they were saved.
+
+    Raises
+    ------
+    SensingError
+        when the file is missing, damaged, of something else or of a newer version.
+    """
+    text = read_text(path, error=SensingError)
+    try:
+        data = json.loads(text)
+        if data["schema"] != SCHEMA or data["schema_version"] > SCHEMA_VERSION:
+            raise SensingError(
+                "not contact thresholds of this version", where=path, expected=f"{SCHEMA}, {SCHEMA_VERSION} or less",
+                got=f"{data['schema']}, {data['schema_version']}",
+            )  # fmt: skip
+        return _from_dict(data)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise SensingError("contact thresholds are damaged", where=path, got=f"{error}") from error
+    except TauhatError as error:
+        raise SensingError("contact thresholds cannot be used", where=path, got=error) from error
+
+
+def _from_dict(data: dict[str, Any]) -> ContactThresholds:
+    rules = dict(data["rules"])
+    zero = dict(rules.pop("zero"))
+    zero["follow"] = _endless(zero["follow"])
+    return ContactThresholds(
+        joint_names=tuple(data["joint_names"]), edges=data["edges"], limits=data["limits"],
+        rules=ContactRules(zero=StandingZero(**zero), **rules), rate=_endless(data["rate"]),
+        promised=_endless(data["promised"]),
+        seconds=np.array([data["seconds"][name] for name in CONDITIONS], dtype=np.float64),
+        spread=np.nan if data["spread"] is None else float(data["spread"]),
+    )  # fmt: skip
+
+
+def _endless(value: float | None) -> float:
+    return np.inf if value is None else float(value)
+
+
+def learn_contact_thresholds(
+    sensor: ForceSensor, free: Sequence[Recording | Log], *, rate: float = 1.0, rules: ContactRules | None = None
+) -> ContactThresholds:
+    """Return thresholds learnt on recordings without contact; the model should not have been fitted on them.
+
+    Parameters
+    ----------
+    free : recordings in which nothing touches the arm, at the speeds of the task and with its pauses
+    rate : of false alarms [1/h]
+    rules : hysteresis, zero, blocks; as stated in `ContactRules` by default
+
+    Raises
+    ------
+    SensingError
+        without free motion, or when the recordings do not fit the sensor.
+
+    Warns
+    -----
+    TauhatWarning
+        when the recordings are too short to promise the rate, or differ so much that one alarms on the others' limits.
+    """
+    return thresholds_of([sensor.along(log) for log in free], slow=sensor.model.slow, rate=rate, rules=rules)
+
+
+def thresholds_of(
+    free: Sequence[SensedLog], *, slow: FloatArray, rate: float = 1.0, rules: ContactRules | None = None
+) -> ContactThresholds:
+    """Return the same from what was already sensed in free motion.
+
+    Parameters
+    ----------
+    slow : (n_v,) speed below which a joint stands [rad/s or m/s]
+    """
+    if not free or not any(log.settled.any() for log in free):
+        raise SensingError(
+            "no free motion to learn thresholds from", remedy="give a log in which nothing touches the arm"
+        )
+    if not 0.0 < rate < np.inf:
+        raise SensingError("rate of false alarms", expected="above zero", got=f"{rate} an hour")
+    followed = rules or ContactRules()
+    tops = np.max([np.abs(log.dq[log.settled]).max(axis=0) for log in free if log.settled.any()], axis=0)
+    edges = np.stack([slow, *(np.maximum(part * tops, slow * (1.0 + part)) for part in _STEPS)])
+    judged = [_free_log(log, edges, followed) for log in free]
+    scale = _scales(judged, 2 + len(edges))
+    maxima = [np.concatenate([log.maxima(scale, kind) for log in judged]) for kind in range(len(CONDITIONS))]
+    levels, promised = _levels(maxima, rate * followed.block / _HOUR, followed.margin)
+    of_rows = np.concatenate([levels[[SETTLING, RESTING]], np.full(len(edges), levels[MOVING])])
+    found = ContactThresholds(
+        joint_names=free[0].joint_names, edges=edges, limits=np.maximum(of_rows[:, None] * scale, followed.least),
+        rules=followed, rate=rate, promised=promised * _HOUR / followed.block,
+        seconds=np.sum([log.seconds for log in judged], axis=0), spread=_spread(judged, scale),
+    )  # fmt: skip
+    _warn(found)
+    return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _FreeLog:
+    """A free log: zeroed residual in standard errors, and to what each number belongs.
+
+    x : (n_t, n_v)
+    kind : (n_t,) place in CONDITIONS
+    row : (n_t, n_v) of the scale
+    block : (n_t,) number of the block of time
+    step : between samples [s]
+    """
+
+    x: FloatArray
+    kind: IntArray
+    row: IntArray
+    block: IntArray
+    step: float
+
+    @property
+    def seconds(self) -> FloatArray:
+        """Return how long each kind of condition lasted, (3,) [s]."""
+        return np.asarray(np.bincount(self.kind, minlength=len(CONDITIONS)) * self.step)
+
+    def largest(self, scale: FloatArray) -> FloatArray:
+        """Return the largest residual over joints, in parts of the scale, (n_t,)."""
+        return np.asarray((self.x / np.take_along_axis(scale, self.row, axis=0)).max(axis=1, initial=0.0))
+
+    def maxima(self, scale: FloatArray, kind: int) -> FloatArray:
+        """Return the maximum of each block over its samples of one kind; blocks without any are left out."""
+        chosen = self.kind == kind
+        blocks, place = np.unique(self.block[chosen], return_inverse=True)
+        found = np.zeros(blocks.size)
+        np.maximum.at(found, place, self.largest(scale)[chosen])
+        return found
+
+
+def _free_log(log: SensedLog, edges: FloatArray, rules: ContactRules) -> _FreeLog:
+    n_v = len(log.joint_names)
+    out = judged_rows(log, (edges, np.full((2 + len(edges), n_v), _OUT_OF_REACH)), rules)
+    told = log.settled & (log.step * np.arange(1, log.n_t + 1) >= rules.quiet)
+    kind, speed = out[told, 2].astype(np.intp), np.abs(log.dq[told])
+    steps = np.stack([np.searchsorted(edges[:-1, j], speed[:, j], side="right") for j in range(n_v)], axis=1)
+    return _FreeLog(
+        x=out[told, 4 : 4 + n_v] * _OUT_OF_REACH, kind=kind, step=log.step,
+        row=np.where(kind[:, None] == MOVING, 2 + steps, kind[:, None]),
+        block=((log.t[told] - log.t[0]) // rules.block).astype(np.intp),
+    )  # fmt: skip
+
+
+def _scales(free: Sequence[_FreeLog], n_rows: int) -> FloatArray:
+    """Return the root mean square by condition and joint; the joint's largest where a condition hardly occurred."""
+    x, row = (np.concatenate([getattr(log, name) for log in free]) for name in ("x", "row"))
+    scale = np.full((n_rows, x.shape[1]), np.nan)
+    for k in range(n_rows):
+        there = row == k
+        counts = there.sum(axis=0)
+        enough = counts * free[0].step >= _FEWEST
+        scale[k, enough] = np.sqrt((np.square(x) * there).sum(axis=0)[enough] / counts[enough])
+    if np.isnan(scale).all(axis=0).any():
+        raise SensingError(
+            "free motion is too short for any threshold", expected=f"{_FEWEST} s of one condition or more"
+        )
+    scale = np.where(np.isnan(scale), np.nanmax(scale, axis=0), scale)
+    return np.asarray(np.maximum(scale, np.finfo(float).tiny))
+
+
+def _levels(maxima: Sequence[FloatArray], p: float, margin: float) -> tuple[FloatArray, float]:
+    """Return the level of each kind, and the alarms a block that are promised."""
+    share, levels, promised = p / len(maxima), np.zeros(len(maxima)), 0.0
+    for kind, values in enumerate(maxima):
+        if not values.size:
+            continue
+        rank = int(np.ceil((values.size + 1) * (1.0 - share)))
+        enough = rank <= values.size
+        levels[kind] = np.sort(values)[rank - 1] if enough else margin * values.max()
+        promised += share if enough else 1.0 / (values.size + 1)
+    return np.where(levels > 0.0, levels, levels.max()), max(promised, p)
+
+
+def _spread(free: Sequence[_FreeLog], scale: FloatArray) -> float:
+    """Return how far the largest residual of one recording is above that of all others."""
+    tops = np.array([[log.maxima(scale, kind).max(initial=0.0) for log in free] for kind in range(len(CONDITIONS))])
+    if len(free) == 1:
+        return np.nan
+    others = np.stack([np.delete(tops, k, axis=1).max(axis=1) for k in range(len(free))], axis=1)
+    ratios = tops[others > 0.0] / others[others > 0.0]
+    return float(ratios.max(initial=0.0))
+
+
+def _warn(found: ContactThresholds) -> None:
+    if not found.keeps_rate:
+        warnings.warn(
+            f"{found.seconds.sum():.0f} s of free motion can promise {found.promised:.3g} false alarms an hour, "
+            f"{found.rate:g} were asked for: thresholds are {found.rules.margin:g} x the largest residual; "
+            "give more recordings without contact",
+            TauhatWarning,
+            stacklevel=3,
+        )
+    if found.spread > found.rules.margin:
+        warnings.warn(
+            f"one recording without contact shows {found.spread:.2f} x the residual of all others: expect false alarms "
+            "in motions that are like none of them",
+            TauhatWarning,
+            stacklevel=3,
+        )
+
+
+def judged_rows(log: SensedLog, scaling: tuple[FloatArray, FloatArray], rules: ContactRules) -> FloatArray:
+    """Return what `contact_kernel.judge_along` says of a log, (n_t, 4 + 2 n_v)."""
+    n_v = len(log.joint_names)
+    sensed = np.ascontiguousarray(np.stack([log.tau, np.square(log.tau_std), log.dq], axis=1))
+    out, memory = np.empty((log.n_t, 4 + 2 * n_v)), (np.zeros((ROWS, n_v)), np.zeros(STATES))
+    judge_along(scaling, rules.way(log.step), sensed, log.settled, memory, out)
+    return out

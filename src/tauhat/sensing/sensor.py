@@ -1,0 +1,299 @@
+"""The virtual force sensor: external joint torque and wrench with error bars, from position and motor torque alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tauhat.arrays import FloatArray, IntArray, read_only
+from tauhat.errors import SensingError
+from tauhat.estimation.estimate import Estimate
+from tauhat.recordings.log import Log
+from tauhat.recordings.recording import Recording
+from tauhat.robots.fitting import check_joint_order
+from tauhat.sensing import sensor_kernel as kernel
+from tauhat.sensing.causal_filter import CausalFilter
+from tauhat.sensing.observer_kernel import DISTURBANCE, ROWS
+from tauhat.sensing.observers import MomentumObserver, Observer
+from tauhat.sensing.sensed_log import SampleCounts, SensedLog
+from tauhat.sensing.sensed_model import SensedModel, sensed_model
+from tauhat.sensing.torque_observer import TorqueObserver
+from tauhat.sensing.wrench import WrenchSolver
+
+CUTOFF = 10.0  # [Hz]
+OFF_RATE = 0.05  # a clock further off than this is another one
+_OF_RATE = 0.45  # the highest cut-off in parts of the rate
+_BRIDGED_STEPS, _BRIDGED = 5.0, 0.02  # lost samples are put back over so many steps, or so long [s]
+_CHUNK = 2**16  # [samples] between which Python may be interrupted
+_HALF = 0.5  # period that a stamp may be late
+_ORDINARY = 0.25  # of the median: two steps further off hold a lost sample, or one that is late
+
+
+class Sensed(NamedTuple):
+    """What one sample told.
+
+    tau, variance : (n_v,) external torque and its variance [Nm or N]
+    q, dq : (n_v,) filtered position and velocity to which it belongs
+    raw : (n_v,) mean external torque since the sample before, not smoothed
+    wrench : (6,) force, then moment, at the frame [N, Nm]
+    covariance : (6, 6) of the wrench
+    """
+
+    tau: FloatArray
+    variance: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    raw: FloatArray
+    wrench: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ForceSensor:
+    """A model, a sample rate and an observer: pure steps, and the same along a log.
+
+    Its memory is a vector that nobody has to look into.
+
+    model : what the estimate knows of the arm, with its tool
+    rate : of the samples [Hz]
+    observer : of the external torque; the momentum observer at 20 1/s by default
+    cutoff : of the filter that position and torque share [Hz]; 10, or what the rate allows
+    delay : how much later than the torque the position was logged [s]; the torque then waits, else the position
+    wrench : frame and directions; a full wrench at the robot's last frame by default
+    """
+
+    model: SensedModel
+    rate: float
+    observer: Observer = field(default_factory=MomentumObserver)
+    cutoff: float | None = None
+    delay: float = 0.0
+    wrench: WrenchSolver | None = None
+    _machine: tuple[Any, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.rate < np.inf:
+            raise SensingError("rate of the samples", expected="above zero", got=f"{self.rate} Hz")
+        if not abs(self.delay) < 1.0:
+            raise SensingError("delay of a channel", expected="below 1 s", got=f"{self.delay} s")
+        solver = self.wrench or WrenchSolver(robot=self.model.robot)
+        if solver.robot.fingerprint != self.model.robot.fingerprint:
+            raise SensingError("the wrench is of another robot", expected=self.model.robot.name, got=solver.robot.name)
+        cutoff = min(CUTOFF, _OF_RATE * self.rate) if self.cutoff is None else self.cutoff
+        object.__setattr__(self, "wrench", solver)
+        object.__setattr__(self, "cutoff", cutoff)
+        observer = TorqueObserver(model=self.model, step=self.step, observer=self.observer, cutoff=cutoff)
+        numbers = np.array([self.step, self._forgetting(cutoff), self.delay * self.rate, self.longest_bridged])
+        limits = read_only(numbers), read_only(self.model.strength)
+        object.__setattr__(self, "_machine", (*observer.parts, solver.task, limits))
+
+    @property
+    def step(self) -> float:
+        """Time between samples [s]."""
+        return 1.0 / self.rate
+
+    @property
+    def n_v(self) -> int:
+        """Number of joints."""
+        return self.model.n_v
+
+    @property
+    def longest_bridged(self) -> float:
+        """Time without samples above which the sensor starts again [s]: five steps, but no less than 20 ms."""
+        return max((_BRIDGED_STEPS + _HALF) * self.step, _BRIDGED)
+
+    def _forgetting(self, cutoff: float) -> float:
+        """Return how fast a start is forgotten [1/s]: the slower of filter and observer."""
+        slowest = self.observer.gain / (self.n_v if self.observer.kind == DISTURBANCE else 1)
+        return min(slowest, CausalFilter(cutoff=cutoff, step=self.step).damping / 2.0)
+
+    def start(self) -> FloatArray:
+        """Return the memory before the first sample."""
+        ring = 0 if self.delay == 0.0 else int(abs(self.delay) * self.rate) + 2
+        size = kernel.CLOCK + (2 + ROWS + ring) * self.n_v + 2 * self.model.bristles.size
+        return read_only(np.where(np.arange(size) < kernel.CLOCK, np.nan, 0.0))
+
+    def advance(self, memory: FloatArray, q: FloatArray, tau: FloatArray) -> tuple[FloatArray, Sensed]:
+        """Return the memory one period later and what the sample told.
+
+        Parameters
+        ----------
+        q, tau : (n_v,) position and motor torque, joint side, as measured [rad or m, Nm or N]
+
+        Raises
+        ------
+        SensingError
+            when the sample is not finite, or the observer needs a mass matrix of a body and the model has none here.
+        """
+        last = memory[0]
+        t = 0.0 if np.isnan(last) else last + self.step
+        after, sensed, code = self.take(memory, t, q, tau)
+        if sensed is None:
+            raise SensingError("a sample that is no sample", where=f"{t:.3f} s", got=f"reason {code}")
+        return after, sensed
+
+    def take(
+        self, memory: FloatArray, t: float, q: FloatArray, tau: FloatArray
+    ) -> tuple[FloatArray, Sensed | None, int]:
+        """Return the memory behind a stamped sample, what it told if it was taken, and a code of `sensor_kernel`.
+
+        Parameters
+        ----------
+        t : time stamp [s]
+        q, tau : as in `advance`
+
+        Raises
+        ------
+        SensingError
+            when the mass matrix is needed and that of no body, or the sample is of another number of joints.
+        """
+        n_v = self.n_v
+        if len(q) != n_v or len(tau) != n_v:
+            raise SensingError("a sample of another robot", expected=f"{n_v} joints", got=f"{len(q)} and {len(tau)}")
+        stamped = np.empty(1 + 2 * n_v)
+        stamped[0], stamped[1 : 1 + n_v], stamped[1 + n_v :] = t, q, tau
+        state, out = memory.copy(), (np.empty((5, n_v)), np.empty((7, 6)))
+        code = kernel.take_one(self._machine, stamped, state, out)
+        if code == kernel.NO_BODY:
+            raise self._no_body()
+        if code > kernel.RESTARTED:
+            return state, None, code
+        tau, variance, q, dq, raw = out[0]
+        return state, Sensed(tau, variance, q, dq, raw, out[1][0], out[1][1:]), code
+
+    def along(self, log: Recording | Log) -> SensedLog:
+        """Return what is sensed along a log; causal: a sample knows none after it.
+
+        Samples that are late, repeated or not finite are counted and left out; behind a gap the sensor starts again.
+
+        Raises
+        ------
+        SensingError
+            when the log is of another robot or rate, or has no torque; or the mass matrix is needed and of no body.
+        """
+        torque = _torque(self.model, log)
+        self._check_rate(log)
+        state, codes = self.start().copy(), np.empty(log.n_t, dtype=np.intp)
+        results = _results(log.n_t, self.n_v)
+        filled = 0
+        for first in range(0, log.n_t, _CHUNK):
+            window = slice(first, first + _CHUNK)
+            samples = tuple(np.array(part[window], dtype=np.float64, order="C") for part in (log.t, log.q, torque))
+            rest = tuple(result[filled:] for result in results)
+            count = kernel.take_all(self._machine, samples, state, rest, codes[window])
+            if count < 0:
+                raise self._no_body()
+            filled += count
+        return self._sensed(log, codes, tuple(result[:filled] for result in results))
+
+    def _sensed(self, log: Recording | Log, codes: IntArray, results: tuple[Any, ...]) -> SensedLog:
+        solver = self.wrench or WrenchSolver(robot=self.model.robot)
+        rows = np.flatnonzero(codes <= kernel.RESTARTED)
+        if not rows.size:
+            raise SensingError("no sample of the log can be used", where=log.name, got=f"{log.n_t} samples")
+        names = ("q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled")
+        joints = self.model.robot.joints
+        return SensedLog(
+            name=log.name, joint_names=tuple(joint.name for joint in joints),
+            prismatic=tuple(joint.name for joint in joints if joint.effort_unit == "N"),
+            frame=str(solver.frame), axes=solver.axes, step=self.step, t=np.array(log.t[rows]), rows=rows,
+            counts=counted(codes), **dict(zip(names, results, strict=True)),
+        )  # fmt: skip
+
+    def _check_rate(self, log: Recording | Log) -> None:
+        step = usual_step(log.t)
+        if not abs(step * self.rate - 1.0) <= OFF_RATE:
+            raise self.other_rate(step, where=log.name)
+
+    def other_rate(self, step: float, *, where: str) -> SensingError:
+        """Return the refusal of samples that are `step` seconds apart."""
+        return SensingError(
+            "samples of another rate", where=where, expected=f"{self.rate:.6g} Hz within {100 * OFF_RATE:.0f} %",
+            got=f"{1.0 / step:.6g} Hz" if step > 0 else "time that stands still",
+            remedy="make the sensor for the rate of the samples (--rate)",
+        )  # fmt: skip
+
+    def _no_body(self) -> SensingError:
+        return SensingError(
+            "the mass matrix of the estimate is that of no body", where=f"observer {self.observer.key}",
+            remedy="take another observer, or identify with --physical",
+        )  # fmt: skip
+
+
+def force_sensor(
+    estimate: Estimate,
+    *,
+    rate: float,
+    observer: Observer | None = None,
+    cutoff: float | None = None,
+    wrench: WrenchSolver | None = None,
+) -> ForceSensor:
+    """Return the force sensor that an estimate makes of a robot.
+
+    Parameters
+    ----------
+    rate : of the samples [Hz]
+    observer, cutoff, wrench : as of `ForceSensor`
+
+    Raises
+    ------
+    ModelError
+        when a term of the model has no value at a single state.
+    SensingError
+        settings that mean nothing.
+    """
+    return ForceSensor(
+        model=sensed_model(estimate), rate=rate, observer=observer or MomentumObserver(), cutoff=cutoff,
+        delay=estimate.processing.delay, wrench=wrench,
+    )  # fmt: skip
+
+
+def usual_step(t: FloatArray) -> float:
+    """Return the time between samples [s]: the mean over pairs of steps near their median, lost samples left out.
+
+    Pairs, since some programs stamp two samples at once. Zero where there are too few.
+    """
+    times = t[np.isfinite(t)]
+    span = min(2, times.size - 1)
+    if span < 1:
+        return 0.0
+    steps = (times[span:] - times[:-span]) / span
+    steps = steps[steps > 0.0]
+    if not steps.size:
+        return 0.0
+    middle = float(np.median(steps))
+    return float(steps[np.abs(steps - middle) <= _ORDINARY * middle].mean())
+
+
+def counted(codes: IntArray) -> SampleCounts:
+    """Return how many samples were taken and why others were not, by their codes in order."""
+    counts = np.bincount(codes, minlength=kernel.NO_BODY)
+    taken = int(counts[kernel.TAKEN] + counts[kernel.RESTARTED])
+    return SampleCounts(
+        taken=taken, late=int(counts[kernel.LATE]), repeated=int(counts[kernel.REPEATED]),
+        not_finite=int(counts[kernel.NOT_FINITE]), restarts=max(0, int(counts[kernel.RESTARTED]) - 1),
+    )  # fmt: skip
+
+
+def _torque(model: SensedModel, log: Recording | Log) -> FloatArray:
+    """Return the torque of a log, after refusing one of another robot."""
+    names = log.joint_names
+    if log.tau is None:
+        raise SensingError(
+            "no torque in the log", where=log.name, remedy="name its columns in the map's [torque] section"
+        )
+    if len(names) != model.n_v:
+        raise SensingError(
+            "the log is of another robot", where=log.name, expected=f"{model.n_v} joints", got=len(names)
+        )
+    check_joint_order(model.robot, names, where=log.name)
+    unnamed = list(names) == [f"joint_{index + 1}" for index in range(len(names))]
+    if not unnamed and set(names) != set(model.robot.joint_names):
+        expected = ", ".join(model.robot.joint_names)
+        raise SensingError("the log is of another robot", where=log.name, expected=expected, got=", ".join(names))
+    return log.tau
+
+
+def _results(n_t: int, n_v: int) -> tuple[Any, ...]:
+    return (*(np.empty((n_t, n)) for n in (*[n_v] * 5, 6, 6)), np.empty(n_t, dtype=np.bool_))

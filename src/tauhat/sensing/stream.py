@@ -1,0 +1,87 @@
+"""Stamped samples one by one, as they come from a robot: taken, or counted and skipped.
+
+What becomes of a sample:
+    a number that is none, or beyond 1e9          skipped, `not_finite`
+    not after the last one                        skipped, `late` or `repeated`; 50 in a row: the clock was set back
+    within five periods (or 20 ms) of the last    taken; lost samples between are put back on straight lines
+    later than that                               taken, and everything starts again with wide error bars
+Stamps that jitter count as whole periods (see `sensor_kernel`). The rate is judged over 100 samples at a time: the
+usual step has to be the sensor's within 5 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tauhat.arrays import FloatArray
+from tauhat.sensing import sensor_kernel as kernel
+from tauhat.sensing.sensed_log import SampleCounts
+from tauhat.sensing.sensor import OFF_RATE, ForceSensor, Sensed, usual_step
+
+_JUDGED = 100  # samples over which the rate is measured
+
+
+class StreamMemory(NamedTuple):
+    """What a stream remembers: the sensor's memory, times since the rate was judged, and what became of samples."""
+
+    sensor: FloatArray
+    times: tuple[float, ...]
+    counts: SampleCounts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SensorStream:
+    """A sensor that reads stamped samples.
+
+    sensor : model, observer, rate
+    name : what messages call the stream
+    """
+
+    sensor: ForceSensor
+    name: str = "stream"
+
+    def start(self) -> StreamMemory:
+        """Return the memory before the first sample."""
+        return StreamMemory(self.sensor.start(), (), SampleCounts())
+
+    def take(
+        self, memory: StreamMemory, t: float, q: FloatArray, tau: FloatArray
+    ) -> tuple[StreamMemory, Sensed | None]:
+        """Return the memory behind a sample, and what it told, None where it was skipped.
+
+        Parameters
+        ----------
+        t : time stamp [s]
+        q, tau : (n_v,) position and motor torque, joint side [rad or m, Nm or N]
+
+        Raises
+        ------
+        SensingError
+            when samples come at another rate than the sensor's, or are of another number of joints.
+        """
+        after, sensed, code = self.sensor.take(memory.sensor, t, q, tau)
+        counts = _with(memory.counts, code)
+        times = memory.times
+        if sensed is not None:
+            times = self._judged((t,) if code == kernel.RESTARTED else (*times, t))
+        return StreamMemory(after, times, counts), sensed
+
+    def _judged(self, times: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the times that are still to be judged, after refusing those of another rate."""
+        if len(times) <= _JUDGED:
+            return times
+        step = usual_step(np.array(times))
+        if not abs(step * self.sensor.rate - 1.0) <= OFF_RATE:
+            raise self.sensor.other_rate(step, where=f"{self.name}, {times[-1]:.6g} s")
+        return times[-1:]
+
+
+def _with(counts: SampleCounts, code: int) -> SampleCounts:
+    if code > kernel.RESTARTED:
+        name = {kernel.LATE: "late", kernel.REPEATED: "repeated"}.get(code, "not_finite")
+        return counts._replace(**{name: getattr(counts, name) + 1})
+    again = int(code == kernel.RESTARTED and counts.taken > 0)
+    return counts._replace(taken=counts.taken + 1, restarts=counts.restarts + again)

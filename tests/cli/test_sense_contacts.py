@@ -1,0 +1,85 @@
+"""`tauhat sense`: contacts by thresholds that are assumed, learnt on free logs, written and read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_workshop import Tauhat, Workshop, made
+
+from tauhat.recordings import read_recording, write_recording
+from tauhat.robots import load_robot
+from tauhat.sensing import WrenchSolver
+
+FORCE = np.array([30.0, 0.0, -40.0, 0.0, 0.0, 0.0])
+FIRST, LAST = 3.0, 3.6  # seconds of the push
+
+
+@dataclass(frozen=True)
+class Bench:
+    estimate: Path
+    free: Path
+    pushed: Path
+
+
+@pytest.fixture(scope="module")
+def bench(workshop: Workshop, tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    folder = tmp_path_factory.mktemp("contacts")
+    log, solver = read_recording(workshop.other_log), WrenchSolver(robot=load_robot("two_link"))
+    external = np.array([solver.jacobian(q)[0].T @ FORCE for q in log.q])
+    external[(log.t < FIRST) | (log.t >= LAST)] = 0.0
+    write_recording(replace(log, tau=log.tau - external), folder / "pushed.parquet")
+    return Bench(workshop.estimate, workshop.other_log, folder / "pushed.parquet")
+
+
+def line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def events(text: str) -> list[dict[str, object]]:
+    found: list[dict[str, object]] = json.loads(text)["events"]
+    return found
+
+
+def test_thresholds_learnt_on_a_free_log_find_the_push_and_nothing_else(bench: Bench, tmp_path: Path) -> None:
+    limits = tmp_path / "limits.json"
+    words = ("sense", bench.estimate, bench.pushed, "--directions", "force", "--json")
+    learnt = made(*words, "--free", bench.free, "--thresholds", limits)
+    assert "free motion can promise" in learnt.stderr
+    (event,) = events(learnt.stdout)
+    assert event["start"] == pytest.approx(FIRST, abs=0.1)
+    assert LAST < event["end"] < LAST + 0.4  # the observer forgets a push of many thresholds in so long
+    assert {"start", "end", "link", "peak", "log"} <= set(event)
+    assert events(made(*words, "--thresholds", limits).stdout) == [event]
+    assert events(made("sense", bench.estimate, bench.free, "--thresholds", limits, "--json").stdout) == []
+
+
+def test_a_rate_that_the_free_motion_supports_is_told(bench: Bench) -> None:
+    words = ("sense", bench.estimate, bench.pushed, "--free", bench.free)
+    assert "thresholds allow 4000 false ones an hour" in line(made(*words, "--alarms", "4000").stdout)
+    assert "were asked for" in line(made(*words).stdout)
+
+
+def test_without_free_motion_a_strong_push_is_found_and_the_doubt_told(bench: Bench) -> None:
+    said = made("sense", bench.estimate, bench.pushed, "--directions", "force").stdout
+    assert "nothing is known of false ones" in line(said)
+    assert "Contacts" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--free", "nowhere.parquet"), "nowhere.parquet"),
+        (("--thresholds", "nowhere.json"), "nowhere.json"),
+        (("--alarms", "0"), "alarms"),
+    ],
+)
+def test_what_cannot_be_learnt_from_is_refused(
+    bench: Bench, tauhat: Tauhat, words: tuple[str, str], message: str
+) -> None:
+    done = tauhat("sense", bench.estimate, bench.pushed, *words)
+    assert done.exit_code != 0
+    assert message in done.stderr
