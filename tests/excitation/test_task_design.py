@@ -61,8 +61,8 @@ def path(clearance: float = 0.02) -> PathRegion:
 
 
 def tiny(**changes: object) -> TaskSettings:
-    stages = tuple(replace(stage, points=4) for stage in two_stages())
-    small = {"stages": stages, "genetic": GeneticSettings(population=8, generations=3), "islands": 1} | changes
+    stages = tuple(replace(stage, points=3) for stage in two_stages())
+    small = {"stages": stages, "genetic": GeneticSettings(population=6, generations=2), "islands": 1} | changes
     return TaskSettings(region=box(tilt=0.2, spin=0.5), home=HOME, **small)
 
 

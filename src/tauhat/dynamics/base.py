@@ -10,7 +10,7 @@ Source: Gautier, "Numerical calculation of the base inertial parameters of robot
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ _SEED = 20240229
 _STATES = 400
 _REVERSALS = 0.2  # share of the steps that turn back
 _PART = 1e-3  # of a column of unit norm: a smaller part in a sum is rounding
+_TEMPERATURES = (10.0, 60.0)  # [deg C]
 _STEP = 0.01  # [s] between the states, for terms that carry a state
 _PREFERENCE = ("Ixx", "Ixy", "Ixz", "Iyz", "Izz", "mx", "my", "mz", "Iyy", "m")
 
@@ -95,6 +96,7 @@ def random_motion(robot: Robot, n_t: int, rng: np.random.Generator) -> Motion:
         dq=speed[:, None] * rng.uniform(-1.0, 1.0, shape),
         ddq=3.0 * speed[:, None] * rng.uniform(-1.0, 1.0, shape),
         step=_STEP,
+        temperature=rng.spawn(1)[0].uniform(*_TEMPERATURES, shape),  # from a stream of its own: the others stay
     )
 
 
@@ -109,7 +111,7 @@ def creeping_motion(robot: Robot, n_t: int, rng: np.random.Generator) -> Motion:
     turns = np.cumprod(np.where(rng.random(shape) < _REVERSALS, -1.0, 1.0), axis=1)
     steps = turns * 10.0 ** rng.uniform(-6.0, -1.0, shape)
     speeds = np.abs(states.dq).max(axis=1, keepdims=True) * 10.0 ** rng.uniform(-4.0, 0.0, shape)
-    return Motion(q=states.q[:, :1] + np.cumsum(steps, axis=1), dq=turns * speeds, ddq=states.ddq, step=_STEP)
+    return replace(states, q=states.q[:, :1] + np.cumsum(steps, axis=1), dq=turns * speeds)
 
 
 def base_parameters(model: TorqueModel, *, tolerance: float = RANK_TOLERANCE) -> BaseParameters:

@@ -31,6 +31,8 @@ from tauhat.dynamics.terms import (
     Spring,
     Stribeck,
     Term,
+    Thermal,
+    ThermalMeasured,
     Viscous,
     ViscousAsymmetry,
 )
@@ -40,7 +42,7 @@ from tauhat.robots.robot import Robot
 _KNOWN: tuple[type[Term], ...] = (
     *(Inertia, InertiaWithoutProducts, RotorInertia, Coupling, CouplingDahl, Spring, GasSpring),
     *(Viscous, CubeRoot, Coulomb, ViscousAsymmetry, Asymmetric, Stribeck, PolynomialFriction),
-    *(Dahl, LoadCoulomb, LoadDahl, Offset),
+    *(Dahl, LoadCoulomb, LoadDahl, Thermal, ThermalMeasured, Offset),
 )
 TERMS: Mapping[str, type[Term]] = {term.key: term for term in _KNOWN}
 """Every term by its name."""

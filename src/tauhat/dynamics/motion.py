@@ -16,12 +16,14 @@ class Motion:
 
     q, dq, ddq : position, velocity, acceleration [rad, rad/s, rad/s^2] or [m, m/s, m/s^2]
     step : time between samples [s]
+    temperature : of the joints [deg C], where it is known
     """
 
     q: FloatArray
     dq: FloatArray
     ddq: FloatArray
     step: float = 0.0
+    temperature: FloatArray | None = None
 
     @property
     def n_v(self) -> int:
@@ -35,7 +37,9 @@ class Motion:
 
     def samples(self, start: int, stop: int) -> Motion:
         """Return samples `start` to `stop`, end excluded."""
-        return Motion(q=self.q[:, start:stop], dq=self.dq[:, start:stop], ddq=self.ddq[:, start:stop], step=self.step)
+        parts = (self.q[:, start:stop], self.dq[:, start:stop], self.ddq[:, start:stop])
+        temperature = None if self.temperature is None else self.temperature[:, start:stop]
+        return Motion(q=parts[0], dq=parts[1], ddq=parts[2], step=self.step, temperature=temperature)
 
 
 class MotionGradient(NamedTuple):

@@ -36,6 +36,7 @@ from tauhat.estimation.robust import BisquareLeastSquares, CauchyLeastSquares, H
 from tauhat.estimation.solution import Solution
 from tauhat.estimation.structure import Structure, Trial, select_model
 from tauhat.estimation.total_least_squares import TotalLeastSquares
+from tauhat.estimation.warm_start import WarmStart, warm_start
 
 __all__ = [
     "ESTIMATORS",
@@ -87,6 +88,7 @@ __all__ = [
     "Structure",
     "TotalLeastSquares",
     "Trial",
+    "WarmStart",
     "WeighedPayload",
     "WeightedLeastSquares",
     "calibrate_drives",
@@ -104,4 +106,5 @@ __all__ = [
     "select_model",
     "survey_logs",
     "unseen_error",
+    "warm_start",
 ]

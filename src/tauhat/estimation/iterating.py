@@ -1,4 +1,4 @@
-"""Terms whose columns depend on what the fit finds: the load on a joint, from the pass before.
+"""Terms whose columns depend on what the fit finds: the load on a joint, from the pass before; the heat of friction.
 
 A joint keeps its load friction only where the recordings show it: its coefficient must have the sign of friction.
 Rotors that are regrouped into links do not load the gear; what of their sum they have is found pass by pass, too
@@ -29,6 +29,7 @@ from tauhat.estimation.rotor_load import (
     with_rotors,
 )
 from tauhat.estimation.shape_uncertainty import rotor_moves
+from tauhat.estimation.warming import warmed
 from tauhat.recordings.processing import Processing
 from tauhat.recordings.recording import Recording
 
@@ -67,8 +68,19 @@ def iterated(
     ----------
     gather : makes the evidence where the recordings are not here; each pass asks for it anew
     """
-    if not any(term.iterated for term in model.terms):
-        return model
+    if any(term.iterated for term in model.terms):
+        model = _settled_load(model, recordings, processing, estimator=estimator, gather=gather)
+    return warmed(model, recordings, processing, estimator, gather=gather)
+
+
+def _settled_load(
+    model: TorqueModel,
+    recordings: Sequence[Recording],
+    processing: Processing,
+    *,
+    estimator: Estimator,
+    gather: Gather | None,
+) -> TorqueModel:
     for _ in range(_PASSES):
         model = _next_pass(model, recordings, processing, estimator=estimator, gather=gather)
     for _ in range(_ROTOR_PASSES if _has_rotors(model) else 0):

@@ -102,7 +102,9 @@ def _stacked(
     for stretch in motion:
         if not times:
             times.append(float(stretch.t[0]))
-        block = Motion(q=stretch.q, dq=stretch.dq, ddq=stretch.ddq, step=step)
+        q, dq, ddq = stretch.q, stretch.dq, stretch.ddq
+        temperature = stretch.temperature if stretch.temperature.size else None
+        block = Motion(q=q, dq=dq, ddq=ddq, step=step, temperature=temperature)
         columns, states = model.columns(block, layout, states)
         yield np.concatenate([columns, stretch.tau, stretch.dq])
 
@@ -116,7 +118,7 @@ def check_recordings(model: TorqueModel, recordings: Sequence[Recording]) -> Non
 
 
 def check_joints(model: TorqueModel, recording: Recording) -> None:
-    """Refuse a recording whose number of joints is not the robot's."""
+    """Refuse a recording whose number of joints is not the robot's, and one without what a term needs."""
     if recording.n_v != model.robot.n_v:
         raise RecordingError(
             "the log does not fit the robot",
@@ -125,3 +127,10 @@ def check_joints(model: TorqueModel, recording: Recording) -> None:
             got=recording.n_v,
             remedy="lock the robot's other joints, or name the right columns in the map",
         )
+    for term in model.terms:
+        missing = [name for name in term.needs if getattr(recording, name) is None]
+        if missing:
+            raise RecordingError(
+                f"term {term.key} needs what the log has not", where=recording.name, expected=", ".join(missing),
+                got=", ".join(recording.channels()), remedy="name its columns in the map, or leave the term out",
+            )  # fmt: skip

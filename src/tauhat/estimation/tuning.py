@@ -140,7 +140,8 @@ def _informed(model: TorqueModel, recordings: Sequence[Recording]) -> TorqueMode
 
 def _facts(recordings: Sequence[Recording]) -> Facts:
     shared = next((recording.shared_motors for recording in recordings if recording.shared_motors), ())
-    return Facts(top_speeds(recordings), shared)
+    means = [recording.temperature.mean(axis=0) for recording in recordings if recording.temperature is not None]
+    return Facts(top_speeds(recordings), shared, np.mean(means, axis=0) if len(means) == len(recordings) else None)
 
 
 def _shaped(

@@ -70,13 +70,14 @@ class Processing:
 
 
 class Stretch(NamedTuple):
-    """Consecutive samples on a uniform clock, joints first: `(n_v, n)` each; `t` (n,) [s]."""
+    """Consecutive samples on a uniform clock, joints first: `(n_v, n)` each; `t` (n,) [s]; temperature may be empty."""
 
     t: FloatArray
     q: FloatArray
     dq: FloatArray
     ddq: FloatArray
     tau: FloatArray
+    temperature: FloatArray = np.zeros((0, 0))
 
 
 def clock_step(recording: Recording) -> float:
@@ -168,8 +169,16 @@ def stretches(recording: Recording, processing: Processing, *, chunk: int = CHUN
     done = 0
     for window in with_context(_uniform_chunks(recording, processing, clock, chunk), half):
         n = window.shape[1] - 2 * half
-        yield _differentiated(window, clock.ticks(done, done + n), filters, processing)
+        stretch = _differentiated(window, clock.ticks(done, done + n), filters, processing)
+        yield stretch._replace(temperature=_temperature(recording, stretch.t + processing.delay))
         done += n
+
+
+def _temperature(recording: Recording, t: FloatArray) -> FloatArray:
+    """Return the temperatures at the times t, (n_v, n); (0, n) where none is measured."""
+    if recording.temperature is None:
+        return np.zeros((0, t.size))
+    return interpolated(recording.t, recording.temperature, t)
 
 
 def _require(recording: Recording, processing: Processing) -> None:

@@ -144,9 +144,10 @@ def _centred(t: FloatArray) -> FloatArray:
 _ADVICE: Mapping[str, str] = {
     "gravity-like shape": "check the inertia of the links, cables and hoses, and the robot's gravity; "
     "a gas spring is the term gas-spring",
-    "warm-up": "record warm, or log temperatures; friction is refitted on minutes of the run",
+    "warm-up": "friction changes as the gears warm up: record a warm-up of tens of minutes and add the term thermal",
     "drift": "check the zero of the torque or current sensors",
-    "temperature": "friction depends on the temperature: fit on recordings at the temperature of the task",
+    "temperature": "friction depends on the temperature: record a warm-up and add the term thermal-measured, or "
+    "thermal where temperatures will not be logged",
     "delay": "position and torque are not at the same time: `delay_samples` in the map, see `tauhat check`",
     "elasticity": "the joint bends: no term has it, stay below its resonance with `--cutoff`",
     "backlash": "the gear has play where its load changes sign: no term has it",
@@ -169,7 +170,7 @@ _CATALOGUE: tuple[tuple[str, Dependence, str, Callable[[JointView, Probes], Floa
     ("delay", "acceleration", "", _delay),
     ("elasticity", "acceleration", "", _bending),
     ("backlash", "load", "", _play),
-    ("warm-up", "time", "", _warm_up),
+    ("warm-up", "time", "thermal", _warm_up),
     ("drift", "time", "", _drift),
-    ("temperature", "temperature", "", _heat),
+    ("temperature", "temperature", "thermal-measured", _heat),
 )

@@ -20,6 +20,7 @@ from tauhat.dynamics.terms.shaped import Shaped
 from tauhat.dynamics.terms.shared_motors import Coupling, CouplingDahl
 from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
 from tauhat.dynamics.terms.term import Facts, Parameter, Term
+from tauhat.dynamics.terms.thermal import Thermal, ThermalMeasured
 
 __all__ = [
     "INERTIAL_SYMBOLS",
@@ -46,6 +47,8 @@ __all__ = [
     "Spring",
     "Stribeck",
     "Term",
+    "Thermal",
+    "ThermalMeasured",
     "Viscous",
     "ViscousAsymmetry",
 ]

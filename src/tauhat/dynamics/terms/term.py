@@ -46,10 +46,12 @@ class Facts(NamedTuple):
 
     top_speeds : (n_v,) largest speed of each joint [rad/s or m/s]
     shared_motors : the motors that, after the log's map, turn with two joints
+    temperatures : (n_v,) mean of each joint's [deg C], where all recordings have them
     """
 
     top_speeds: FloatArray
     shared_motors: tuple[SharedMotor, ...] = ()
+    temperatures: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +62,7 @@ class Term(ABC):
     dissipates: ClassVar[bool] = False
     stateful: ClassVar[bool] = False
     iterated: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ()  # what a recording must have measured beside position and torque
     stands_for: ClassVar[tuple[str, ...]] = ()  # keys of terms that it contains, and cannot be told apart from
 
     @abstractmethod
