@@ -7,13 +7,21 @@ from typing import Any
 
 from tauhat.errors import ModelError
 from tauhat.studies.crs_a465 import CrsA465Study
+from tauhat.studies.force_sensing import ForceSensingStudy
 from tauhat.studies.local_global import LocalGlobalStudy
 from tauhat.studies.monte_carlo import MonteCarloStudy
 from tauhat.studies.real_logs import RealLogsStudy
 from tauhat.studies.study import Study
 from tauhat.studies.whole_rehearsal import WholeRehearsalStudy
 
-_KINDS: tuple[type[Study], ...] = (CrsA465Study, LocalGlobalStudy, MonteCarloStudy, RealLogsStudy, WholeRehearsalStudy)
+_KINDS: tuple[type[Study], ...] = (
+    CrsA465Study,
+    ForceSensingStudy,
+    LocalGlobalStudy,
+    MonteCarloStudy,
+    RealLogsStudy,
+    WholeRehearsalStudy,
+)
 STUDIES: dict[str, type[Study]] = {kind.key: kind for kind in _KINDS}
 
 
