@@ -10,7 +10,7 @@ from task_benchmark import NO_EXCESS, Outcome, outcome, summary
 
 pytest.importorskip("ruckig", reason="the extra `planner` is not installed")
 
-SEEDS = range(200, 214)  # other tasks than those of the benchmark
+SEEDS = range(200, 207)  # other tasks than those of the benchmark
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def outcomes() -> list[Outcome]:
 
 def test_designed_programs_keep_limits_and_their_points_the_region(outcomes: list[Outcome]):
     designed = [one for one in outcomes if not one.reason]
-    assert len(designed) >= 5
+    assert len(designed) >= 3
     assert 0.5 < max(one.used for one in designed) <= 1.0 + NO_EXCESS
     assert max(one.outside for one in designed) < 1e-9
     assert max(one.late for one in designed) <= 1e-9
