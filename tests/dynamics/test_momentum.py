@@ -8,7 +8,7 @@ import pytest
 
 from sample_arms import random_tree
 from tauhat.dynamics import base_parameters, torque_model
-from tauhat.dynamics.momentum_kernel import momentum_along_kernel
+from tauhat.dynamics.momentum_kernel import momentum_kernel
 from tauhat.dynamics.tree import kernel_tree
 from tauhat.robots import load_robot
 from tauhat.robots.kinematics import pinocchio_model
@@ -18,7 +18,9 @@ from tauhat.robots.library import builtin_names
 def momentum(robot, inertia, q, dq, rotor=None):
     out = np.empty((len(q), 2, robot.n_v))
     rotors = np.zeros(robot.n_v) if rotor is None else rotor
-    momentum_along_kernel((kernel_tree(robot).links, inertia, rotors), q, dq, out)
+    body, work = (kernel_tree(robot).links, inertia, rotors), np.empty(40 * robot.n_v)
+    for k in range(len(q)):
+        momentum_kernel(body, q[k], dq[k], work, out[k])
     return out[:, 0], out[:, 1]
 
 

@@ -10,6 +10,7 @@ import pytest
 from tauhat.dynamics import torque_model
 from tauhat.errors import ModelError, RecordingError, TauhatWarning
 from tauhat.estimation import Estimate, identify, load_estimate, warm_start
+from tauhat.estimation.estimators import estimator_named
 from tauhat.estimation.rows import filtered_rows
 from tauhat.estimation.warming import slopes_of, thermal_term
 from tauhat.recordings.processing import Processing, stretches
@@ -81,6 +82,13 @@ def test_the_warmth_of_a_log_that_begins_cold_is_nothing():
     start = warm_start(found.thermal, warm_log(found.arm, 0.5, seed=7))
     assert start.warmth == pytest.approx(0.0, abs=0.03)
     assert start.rest is None or start.rest.duration < 1.0
+
+
+def test_seconds_that_a_log_does_not_have_make_its_warmth_no_surer():
+    found = warmed_up()
+    log = warm_log(found.arm, 0.5, warmer=found.hot, seed=7)
+    short, asked = warm_start(found.thermal, log, seconds=30.0), warm_start(found.thermal, log, seconds=600.0)
+    assert asked.standard_errors == pytest.approx(short.standard_errors, rel=1e-12)
 
 
 def test_without_drift_the_slopes_are_zero():
@@ -182,6 +190,17 @@ def test_short_recordings_are_warned_of():
     arm = two_link()
     with pytest.warns(TauhatWarning, match="too short to show friction that warms up"):
         identify(torque_model(arm.robot, "plain,thermal"), [warm_log(arm, 1.0)])
+
+
+@pytest.mark.filterwarnings("ignore::tauhat.errors.TauhatWarning")
+def test_methods_that_go_through_recordings_settle_the_warmth_or_refuse_the_term_by_name():
+    arm = two_link()
+    log, model = warm_log(arm, 0.3), torque_model(arm.robot, "plain,thermal")
+    settled = thermal_term(identify(model, [log], estimator=estimator_named("sequential")).model)
+    assert settled is not None
+    assert len(settled.times) == 2
+    with pytest.raises(ModelError, match="ekf cannot use term thermal"):
+        identify(model, [log], estimator=estimator_named("ekf"))
 
 
 def test_what_has_no_warmth_has_no_warm_start():

@@ -19,7 +19,6 @@ Source: De Luca, Albu-Schaeffer, Haddadin, Hirzinger 2006 (momentum in place of 
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
 from tauhat.dynamics.forward_kernel import place_link
@@ -42,14 +41,6 @@ def momentum_kernel(body, q, dq, work, out):  # type: ignore[no-untyped-def]
         out[0, i] += rotor[i] * dq[i]
         if links[i].parent >= 0:
             _merged(work, 40 * i, 40 * links[i].parent)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
-def momentum_along_kernel(body, q, dq, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (n_t, 2, n_v) with momentum and drift of states `q`, `dq` (n_t, n_v)."""
-    work = np.empty(40 * q.shape[1])
-    for k in range(q.shape[0]):
-        momentum_kernel(body, q[k], dq[k], work, out[k])
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})

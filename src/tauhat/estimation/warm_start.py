@@ -73,7 +73,7 @@ def warm_start(estimate: Estimate, recording: Recording, *, seconds: float = 30.
     if not tau.size:
         raise ModelError("no motion to tell the warmth from", where=recording.name, remedy="look at more seconds")
     change = warm - cold
-    share = min(1.0, seconds / _INDEPENDENT / tau.shape[1])  # of the rows that is independent
+    share = min(1.0, _spacing(estimate.processing, head) / _INDEPENDENT)  # of the rows that is independent
     known = share * (change**2).sum(axis=1) / estimate.joint_rms**2 + 1.0 / _SPREAD**2
     warmth = share * (change * (tau - cold)).sum(axis=1) / estimate.joint_rms**2 / known
     return WarmStart(
@@ -89,6 +89,12 @@ def _from(estimate: Estimate, term: Thermal, warmth: FloatArray) -> Estimate:
 
 def _behind(recording: Recording, count: int) -> Recording | None:
     return recording.rows(count, recording.n_t) if recording.n_t - count >= FEWEST_SAMPLES else None
+
+
+def _spacing(processing: Processing, recording: Recording) -> float:
+    """Return the time between filtered rows [s]."""
+    step = clock_step(recording)
+    return step * processing.decimation(1.0 / step)
 
 
 def _warmed_along(term: Thermal, warmth: FloatArray, processing: Processing, recording: Recording) -> FloatArray:

@@ -21,7 +21,7 @@ from tauhat.dynamics.terms.thermal import TYPICAL_PART
 from tauhat.errors import TauhatWarning
 from tauhat.estimation.evidence import Gather, gathering
 from tauhat.estimation.friction import steady_friction
-from tauhat.estimation.least_squares import Estimator
+from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.shape_uncertainty import nearer_shapes
 from tauhat.estimation.shapes import chosen_form
@@ -72,7 +72,7 @@ def warmed(
     passed = [_own(model)]
     for _ in range(_MOST_PASSES):
         model = model.with_term(_heated_back(model, passed[-1], take, estimator))
-        model = _nearer(model, processing, take, estimator) if is_open else model
+        model = _nearer(model, processing, take) if is_open else model
         passed.append(_own(model))
         if _settled(*passed[-2:]):
             break
@@ -178,11 +178,11 @@ def _timed(
     return model.with_term(chosen)
 
 
-def _nearer(model: TorqueModel, processing: Processing, gather: Gather, estimator: Estimator) -> TorqueModel:
+def _nearer(model: TorqueModel, processing: Processing, gather: Gather) -> TorqueModel:
     """Return the model with its time constants one Gauss-Newton step nearer to the least residual."""
     base = base_parameters(model)
     evidence = gather(model, base, 1)
     problem = Problem(
         model=model, base=base, recordings=(), processing=processing, evidence=evidence, gather=gather
     )  # fmt: skip
-    return nearer_shapes(problem, estimator.fit(evidence), {Thermal.key})
+    return nearer_shapes(problem, WeightedLeastSquares().fit(evidence), {Thermal.key})
