@@ -1,10 +1,10 @@
-# make demo | test | lint | docs | clean: each works from a bare checkout with python3, make and the package index.
+# make demo | test | lint | docs | forget-kernels | clean: each works from a bare checkout with python3, make and the package index.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test lint format docs clean
+.PHONY: demo test lint format docs forget-kernels clean
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -31,5 +31,9 @@ format: $(STAMP)
 	$(BIN)/ruff format src tests benchmarks examples docs/site
 	$(BIN)/ruff check --fix src tests benchmarks examples docs/site
 
-clean:
+# compiled functions that may hold older versions of those they call: docs/code.md
+forget-kernels:
+	find src -name '*.nb[ci]' -delete
+
+clean: forget-kernels
 	rm -rf $(VENV) build dist *.egg-info src/*.egg-info .mypy_cache .ruff_cache .pytest_cache

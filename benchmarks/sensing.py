@@ -31,7 +31,7 @@ from tauhat.sensing.causal_filter import CausalFilter
 
 RATE, STEPS = 1000.0, 20_000
 LEVELS = (0.5, 0.999, 1.0)
-WIDTH, LARGEST = 0.02, np.repeat([1000.0, 200.0], 3)
+WIDTH, LARGEST = 0.02, np.repeat([300.0, 60.0], 3)
 
 
 def arm(name: str) -> SensedModel:

@@ -18,9 +18,8 @@ first push; in the repeated motion of No5, torque against the median of its own 
 two are behind a zero-phase 5 Hz filter and labelled above 30 % of the run's largest, so they tell strong pushes and
 share the motor currents with what is judged.
 
-The ur10e was logged every 10 or 12 ms and the stamps are right: its logs are put on an even clock by them. Counted as
-one period each, as the sensor does with stamps that jitter, they make the torque of free motion four times as wrong
-(`clock` in the output).
+The ur10e was logged every 10 or 12 ms and the stamps are right, which the sensor finds out in the first second of motion
+(`--stamps auto`). `clock` in the output: the same with stamps counted as one period each, and believed from the start.
 
 Free motion. Thresholds are learnt on runs that the model was not fitted to, and judged on runs that neither saw.
 """
@@ -47,7 +46,6 @@ from tauhat.estimation.identify import identify
 from tauhat.estimation.physical_constraints import PhysicalConstraints
 from tauhat.estimation.selecting import identify_selected
 from tauhat.recordings import Recording, read_recording
-from tauhat.recordings.processing import clock_step
 from tauhat.robots import Robot, load_robot
 from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
 from tauhat.sensing.contact import ContactDetector, ContactEvent
@@ -55,7 +53,7 @@ from tauhat.sensing.contact_thresholds import ContactRules, ContactThresholds, t
 from tauhat.sensing.observers import OBSERVERS, Observer, observer_named
 from tauhat.sensing.payload_check import check_payload
 from tauhat.sensing.sensed_log import SensedLog
-from tauhat.sensing.sensor import force_sensor, usual_step
+from tauhat.sensing.sensor import STAMPS, Stamps, force_sensor, usual_step
 from tauhat.sensing.wrench import WrenchSolver, directions_named
 from tauhat.sensing.zero import NO_ZERO, StandingZero, zeroed
 
@@ -85,22 +83,12 @@ class Arm:
     ending: str
     robot: Robot
 
-    def as_logged(self, name: str) -> Recording:
-        return read_recording(self.folder / f"{name}{self.ending}", map=self.map)
-
     def log(self, name: str) -> Recording:
-        """The log on an even clock, between samples on straight lines by their stamps, which costs a sample at most."""
-        log = self.as_logged(name)
-        if np.ptp(np.diff(log.t)) < 1e-3:
-            return log
-        step = clock_step(log)
-        t = log.t[0] + step * np.arange(int(log.duration / step))
-        even = {part: np.stack([np.interp(t, log.t, x) for x in getattr(log, part).T], axis=1) for part in ("q", "tau")}
-        return Recording(t=t, **even, joint_names=log.joint_names, name=log.name, source=log.source)
+        return read_recording(self.folder / f"{name}{self.ending}", map=self.map)
 
     def fitted(self, names: Sequence[str], kind: str = "robust") -> Estimate:
         """The model of `tauhat identify --model KIND` (`+physical`: `--physical`)."""
-        logs = [self.as_logged(name) for name in names]
+        logs = [self.log(name) for name in names]
         word = kind.removesuffix("+physical")
         way = identify_selected if word == "auto" else identify
         with warnings.catch_warnings():
@@ -118,12 +106,13 @@ def sensed(
     observer: Observer | None = None,
     cutoff: float | None = None,
     wrench: dict[str, Any] | None = None,
+    stamps: Stamps = "auto",
 ) -> SensedLog:
     """Force alone at the robot's last frame, by the sensor's defaults."""
     settings = {"directions": directions_named("force")} | (wrench or {})
     solver = WrenchSolver(robot=estimate.robot, **settings)
     rate = 1.0 / usual_step(log.t)
-    return force_sensor(estimate, rate=rate, observer=observer, cutoff=cutoff, wrench=solver).along(log)
+    return force_sensor(estimate, rate=rate, observer=observer, cutoff=cutoff, wrench=solver, stamps=stamps).along(log)
 
 
 class Ur5Models:
@@ -410,26 +399,29 @@ def half_rows(free: dict[str, SensedLog], estimate: Estimate, rules: ContactRule
 
 def part(log: SensedLog, half: int) -> SensedLog:
     window = slice(0, log.n_t // 2) if half == 0 else slice(log.n_t // 2, None)
-    names = ("t", "rows", "q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled")
+    names = ("t", "rows", "q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled", "lag")
     return replace(log, **{name: np.array(getattr(log, name)[window]) for name in names})
 
 
 def clock_rows(arm: Arm) -> list[dict[str, Any]]:
-    """Rms of the external torque in free motion, stamps counted as periods and taken as they are."""
+    """Rms of the external torque in free motion, stamps counted as periods, believed, and as positions tell."""
     estimate, rows = arm.fitted(UR10E_FIT), []
     for name in UR10E_FREE[:1]:
-        for word, log in (("stamps counted", arm.as_logged(name)), ("stamps believed", arm.log(name))):
-            found = sensed(estimate, log)
+        for stamps in STAMPS:
+            found = sensed(estimate, arm.log(name), stamps=stamps)
             rows_moving = (np.abs(found.dq) > 0.2) & found.settled[:, None]
             rms = np.sqrt((np.square(found.tau) * rows_moving).sum(axis=0) / rows_moving.sum(axis=0))
-            rows.append({"log": name, "clock": word, "rms": rms.tolist()})
+            row = {"log": name, "clock": stamps, "rms": rms.tolist(), "believed": found.believed, "samples": found.n_t}
+            rows.append(row)
     return rows
 
 
 def show_clock(rows: list[dict[str, Any]]) -> None:
     print("\nrms of external torque in free motion, joints faster than 0.2 rad/s, Nm")
     for row in rows:
-        print(f"{row['log']:42} {row['clock']:18} {' '.join(f'{value:6.2f}' for value in row['rms'])}")
+        print(
+            f"{row['log']:42} {row['clock']:18} {' '.join(f'{value:6.2f}' for value in row['rms'])}  believed {row['believed']} of {row['samples']}"
+        )
 
 
 def ur10e_contacts(arm: Arm) -> dict[str, Any]:

@@ -32,6 +32,7 @@ LEVELS = {
     name: level
     for level, names in enumerate(
         [
+            ("kernel_cache",),
             ("", "errors", "blas"),
             ("workers",),
             ("cluster",),

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,6 +36,16 @@ def bench(workshop: Workshop, tmp_path_factory: pytest.TempPathFactory) -> Bench
     external[(log.t < FIRST) | (log.t >= LAST)] = 0.0
     write_recording(replace(log, tau=log.tau - external), folder / "pushed.parquet")
     return Bench(workshop.estimate, workshop.other_log, folder / "pushed.parquet")
+
+
+def answers(bench: Bench, log: Path, *words: str) -> list[dict[str, Any]]:
+    """Return what is answered to the samples of a log through a pipe."""
+    recording = read_recording(log)
+    rows = zip(recording.t, recording.q, recording.tau, strict=True)
+    given = "\n".join(json.dumps({"t": t, "q": q.tolist(), "tau": tau.tolist()}) for t, q, tau in rows)
+    command = [sys.executable, "-m", "tauhat", "sense", str(bench.estimate), "--input", "-", "--rate", "250"]
+    done = subprocess.run([*command, *words], input=given.encode(), capture_output=True, timeout=120, check=True)
+    return [json.loads(text) for text in done.stdout.splitlines()]
 
 
 def line(text: str) -> str:
@@ -67,6 +80,30 @@ def test_without_free_motion_a_strong_push_is_found_and_the_doubt_told(bench: Be
     said = made("sense", bench.estimate, bench.pushed, "--directions", "force").stdout
     assert "nothing is known of false ones" in line(said)
     assert "Contacts" in said
+
+
+def test_samples_through_a_pipe_are_told_when_a_contact_begins_and_ends(bench: Bench, tmp_path: Path) -> None:
+    limits = tmp_path / "limits.json"
+    words = ("sense", bench.estimate, bench.pushed, "--directions", "force", "--json")
+    (event,) = events(made(*words, "--free", bench.free, "--thresholds", limits).stdout)
+    for choice in (("--thresholds", str(limits)), ("--free", str(bench.free))):
+        found = answers(bench, bench.pushed, *choice)
+        told = [(answer["event"], answer["t"]) for answer in found if "event" in answer]
+        first, (word, end) = told
+        assert first == ("start", event["start"])
+        assert (word, end) == (
+            "end",
+            pytest.approx(event["end"], abs=0.005),
+        )  # the first sample without, not the last with
+        touched = [answer["t"] for answer in found if answer["contact"]]
+        assert (touched[0], touched[-1]) == (event["start"], event["end"])
+        assert max(answer["excess"] for answer in found) == pytest.approx(event["excess"], rel=1e-3)
+        assert {answer["link"] for answer in found if not answer["contact"]} == {None}
+    assert not any(answer["contact"] for answer in answers(bench, bench.free, "--thresholds", str(limits)))
+
+
+def test_without_thresholds_a_pipe_says_nothing_of_contact(bench: Bench) -> None:
+    assert {"contact", "event", "link"}.isdisjoint(answers(bench, bench.pushed)[-1])
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio
 import pytest
 from scipy.interpolate import interp1d
+from scipy.signal import lfilter
 from sensed_arms import RATE, frictionless, motion
 
 from tauhat.dynamics import torque_model
@@ -36,6 +37,11 @@ T = np.arange(len(Q)) / RATE
 SENSOR = ForceSensor(model=MODEL, rate=RATE)
 READY = np.array([0.0, -0.6, 0.0, -2.2, 0.0, 1.6, 0.8])
 PUSH = np.array([12.0, -20.0, 8.0, 0.0, 0.0, 0.0])
+
+
+def late_by(kept: float, values: np.ndarray) -> np.ndarray:
+    """Return values behind a low-pass of first order that keeps this part of itself, by SciPy."""
+    return lfilter([1.0 - kept], [1.0, -kept], values, axis=0, zi=kept * values[:1])[0]
 
 
 def recording(tau: np.ndarray = TAU, **changes: object) -> Recording:
@@ -97,7 +103,12 @@ def test_without_gaps_torque_is_that_of_the_observer_and_wrench_that_of_the_solv
     assert (found.tau_std**2 >= observed.variance).all()
     late = found.settled & (T > 1.0)
     assert found.tau_std[late] ** 2 == pytest.approx(observed.variance[late], rel=0.1)
-    solved = WrenchSolver(robot=MODEL.robot).along(observed.q[late], observed.tau[late], found.tau_std[late] ** 2)
+    kept = np.exp(-SENSOR.observer.gain / RATE)
+    position, torque = (late_by(kept, values) for values in (observed.q, observed.tau))
+    assert found.q == pytest.approx(position, abs=1e-12)
+    assert found.lag == pytest.approx(observed.tau - torque, abs=1e-12)
+    variance = found.tau_std[late] ** 2 + found.lag[late] ** 2
+    solved = WrenchSolver(robot=MODEL.robot).along(found.q[late], observed.tau[late], variance)
     assert found.wrench[late] == pytest.approx(solved.wrench, abs=1e-6)
     assert found.wrench_std[late] == pytest.approx(solved.standard_errors, rel=1e-6)
 

@@ -7,12 +7,19 @@ from functools import cache
 
 import numpy as np
 import pytest
+from sensed_arms import frictionless, motion
 
+from tauhat.dynamics.passive_kernel import ELEMENT, VISCOUS
+from tauhat.dynamics.terms import Thermal
 from tauhat.errors import SensingError
 from tauhat.sensing.observers import OBSERVERS, ThermalObserver, observer_named
 from tauhat.sensing.sensed_model import sensed_model
-from tauhat.sensing.sensor import force_sensor
-from tauhat.sensing.torque_observer import SensedTorque, TorqueObserver
+from tauhat.sensing.sensor import ForceSensor, force_sensor
+from tauhat.sensing.sensor_kernel import split
+from tauhat.sensing.stamp_kernel import LATE, RESTARTED
+from tauhat.sensing.thermal import SensedHeat
+from tauhat.sensing.thermal_kernel import VARIANCE, WARMTH
+from tauhat.sensing.torque_observer import SensedTorque, SensedWarmth, TorqueObserver
 from warm_arms import WarmedUp, warm_log, warmed_up
 
 RATE, SECONDS = 250.0, 150.0
@@ -163,12 +170,84 @@ def test_without_slopes_it_is_the_momentum_observer():
         assert (part == other).all()
 
 
+def test_viscous_friction_that_is_warm_is_taken_off_at_the_velocity_of_the_filtered_position():
+    cold, rate = frictionless(), 50.0
+    q, tau = motion(cold.robot, 4.0, rate)
+    sticky = np.zeros(7, dtype=ELEMENT)
+    sticky["kind"], sticky["joint"], sticky["weight"] = VISCOUS, np.arange(7), 20.0
+    steady = TorqueObserver(model=replace(cold, sliding=sticky), step=1.0 / rate).along(q, tau)
+    heat = SensedHeat(term=Thermal(times=(1e9,) * 7), slopes=np.tile([0.0, 20.0], (7, 1)))  # warm, and stays it
+    seer = TorqueObserver(
+        model=replace(cold, heat=heat), step=1.0 / rate, observer=ThermalObserver(start=1.0, spread=1e-6, wander=1e-6)
+    )
+    assert seer.along(q, tau, free=np.zeros(len(q), dtype=np.bool_)).tau == pytest.approx(steady.tau, abs=1e-4)
+
+
 def test_the_force_sensor_takes_it():
     found = warmed_up()
     log = warm_log(found.arm, 0.5, rate=RATE, warmer=found.hot, seed=7)
     sensor = force_sensor(found.thermal, rate=RATE, observer=ThermalObserver())
     tau = sensor.along(log).tau
     assert tau == pytest.approx(observer().along(log.q, log.tau).tau, abs=1e-9)
+
+
+def behind_gap(gap: float) -> tuple[SensedWarmth, SensedWarmth, WarmedUp]:
+    """Return the warmth before a gap in a log and at the first sample behind it."""
+    found = warmed_up()
+    log = warm_log(found.arm, 0.5, rate=RATE, warmer=found.hot, seed=7)
+    sensor = force_sensor(found.thermal, rate=RATE, observer=ThermalObserver())
+    memory, told = sensor.start(), []
+    for k in range(log.n_t // 2):
+        memory, _, _ = sensor.take(memory, log.t[k], log.q[k], log.tau[k])
+    told.append(warmth_of(sensor, memory))
+    memory, _, code = sensor.take(memory, log.t[k] + gap, log.q[k], log.tau[k])
+    assert code == RESTARTED
+    return told[0], warmth_of(sensor, memory), found
+
+
+def warmth_of(sensor: ForceSensor, memory: np.ndarray) -> SensedWarmth:
+    rows = split(memory.copy(), sensor.n_v, sensor.model.bristles.size)[2]
+    return SensedWarmth(rows[WARMTH].copy(), rows[VARIANCE].copy())
+
+
+@pytest.mark.parametrize("gap", [0.5, 20.0, 200.0])
+def test_a_gap_keeps_the_warmth_and_makes_it_less_sure(gap):
+    before, after, found = behind_gap(gap)
+    kept, settings = np.exp(-gap / np.array(found.term.times)), ThermalObserver()
+    middle = kept * before.theta + (1.0 - kept) * settings.start
+    assert after.theta == pytest.approx(middle, abs=2e-3)  # less what one sample does
+    assert (after.variance > before.variance).all()
+    error = 1.96 * np.sqrt(after.variance)
+    idle, running = (
+        kept * before.theta,
+        kept * before.theta + (1.0 - kept),
+    )  # the arm stood, or ran at the typical speed
+    assert (np.abs(after.theta - idle) < error).all()
+    assert (np.abs(after.theta - running) < error).all()
+
+
+def test_behind_a_very_long_gap_or_another_clock_the_warmth_is_as_at_a_start():
+    _, long_after, _ = behind_gap(1e6)
+    _, set_back, _ = behind_gap_of_another_clock()
+    settings = ThermalObserver()
+    for found in (long_after, set_back):
+        assert found.theta == pytest.approx(settings.start, abs=5e-3)
+        assert np.sqrt(found.variance) == pytest.approx(settings.spread, rel=0.05)
+
+
+def behind_gap_of_another_clock() -> tuple[SensedWarmth, SensedWarmth, WarmedUp]:
+    found = warmed_up()
+    log = warm_log(found.arm, 0.5, rate=RATE, warmer=found.hot, seed=7)
+    sensor = force_sensor(found.thermal, rate=RATE, observer=ThermalObserver())
+    memory = sensor.start()
+    for k in range(log.n_t // 2):
+        memory, _, _ = sensor.take(memory, log.t[k], log.q[k], log.tau[k])
+    before, code = warmth_of(sensor, memory), LATE
+    for late in range(50):
+        assert code == LATE
+        memory, _, code = sensor.take(memory, log.t[k] - 100.0 + late / RATE, log.q[k], log.tau[k])
+    assert code == RESTARTED
+    return before, warmth_of(sensor, memory), found
 
 
 def test_estimates_without_the_term_are_refused():

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -12,12 +13,18 @@ from tauhat.cli.reporting import say
 
 if TYPE_CHECKING:
     from tauhat.arrays import FloatArray
+    from tauhat.sensing.contact_thresholds import ContactThresholds
     from tauhat.sensing.sensed_log import SampleCounts
     from tauhat.sensing.sensor import ForceSensor, Sensed
 
 
-def answer(sensor: ForceSensor) -> None:
+_Judge: TypeAlias = "Callable[[Sensed], dict[str, Any]]"
+
+
+def answer(sensor: ForceSensor, thresholds: ContactThresholds | None = None) -> None:
     """Answer the samples on standard input until it ends; tell on standard error how many there were.
+
+    With thresholds each answer says whether something touches the arm, and where that begins or ends.
 
     Raises
     ------
@@ -30,6 +37,7 @@ def answer(sensor: ForceSensor) -> None:
 
     stream = SensorStream(sensor=sensor, name="standard input")
     memory, malformed, n_v = stream.start(), 0, sensor.n_v
+    judge: _Judge = _no_contacts if thresholds is None else _contacts(thresholds, sensor)
     for sample in read_samples(sys.stdin.buffer, sensor.model.robot):
         sized = sample is not None and len(sample.q) == n_v == len(sample.tau)
         if sample is None or (not sized and memory.counts.taken):
@@ -37,7 +45,7 @@ def answer(sensor: ForceSensor) -> None:
             continue
         memory, sensed = stream.take(memory, sample.t, np.array(sample.q), np.array(sample.tau))
         if sensed is not None:
-            sys.stdout.write(json.dumps(_answered(sample.t, sensed), allow_nan=False) + "\n")
+            sys.stdout.write(json.dumps(_answered(sample.t, sensed) | judge(sensed), allow_nan=False) + "\n")
             sys.stdout.flush()
     counts = memory.counts._replace(malformed=malformed)
     if not counts.taken:
@@ -53,6 +61,30 @@ def _answered(t: float, sensed: Sensed) -> dict[str, Any]:
         "wrench": _short(sensed.wrench),
         "wrench_std": _short(np.sqrt(np.diagonal(sensed.covariance))),
     }
+
+
+def _no_contacts(sensed: Sensed) -> dict[str, Any]:  # noqa: ARG001
+    return {}
+
+
+def _contacts(thresholds: ContactThresholds, sensor: ForceSensor) -> _Judge:
+    """Return what says of each sample in turn whether something touches the arm."""
+    from tauhat.sensing.contact import ContactDetector
+
+    detector = ContactDetector(thresholds=thresholds, step=sensor.step)
+    detector.check_joints(tuple(sensor.model.robot.joint_names), where="standard input")
+    memory, touched = detector.start(), False
+
+    def judge(sensed: Sensed) -> dict[str, Any]:
+        nonlocal memory, touched
+        memory, found = detector.advance(memory, sensed.tau, sensed.variance, sensed.dq, settled=sensed.settled)
+        said: dict[str, Any] = {"contact": found.contact, "excess": float(f"{found.excess:.4g}"), "link": found.link}
+        if found.contact != touched:
+            said["event"] = "start" if found.contact else "end"
+        touched = found.contact
+        return said
+
+    return judge
 
 
 def _short(values: FloatArray) -> list[float]:

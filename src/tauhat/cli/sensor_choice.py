@@ -22,6 +22,7 @@ class SensorChoice:
     directions: str
     axes: Literal["base", "frame"]
     tool: Path | None
+    stamps: Literal["auto", "exact", "jittered"]
 
     def sensor(self, rate: float) -> ForceSensor:
         """Return the sensor for samples of this rate [Hz].
@@ -44,7 +45,9 @@ class SensorChoice:
             robot=estimate.robot, frame=self.frame, directions=directions_named(self.directions), axes=self.axes
         )
         observer = observer_named(self.observer, gain=self.gain)
-        sensor = force_sensor(estimate, rate=rate, observer=observer, cutoff=self.cutoff, wrench=wrench)
+        sensor = force_sensor(
+            estimate, rate=rate, observer=observer, cutoff=self.cutoff, wrench=wrench, stamps=self.stamps
+        )
         if self.tool is None:
             return sensor
         tool = load_tool(self.tool)

@@ -129,13 +129,14 @@ class ContactDetector:
         return ContactMemory(np.zeros((ROWS, self.thresholds.n_v)), np.zeros(STATES))
 
     def advance(
-        self, memory: ContactMemory, tau: FloatArray, variance: FloatArray, dq: FloatArray
+        self, memory: ContactMemory, tau: FloatArray, variance: FloatArray, dq: FloatArray, *, settled: bool = True
     ) -> tuple[ContactMemory, ContactSample]:
         """Return the memory behind a sample and whether something touches the arm.
 
         Parameters
         ----------
         tau, variance, dq : (n_v,) external torque, its variance, and the velocity, as a sensor gives them
+        settled : whether the sensor has forgotten its start; nothing is told before
         """
         after = ContactMemory(memory.rows.copy(), memory.state.copy())
         sensed = np.stack([tau, variance, dq])
@@ -143,7 +144,7 @@ class ContactDetector:
             raise SensingError(
                 "a sample of another robot", where="contact", expected=f"{self.thresholds.n_v} joints", got=sensed.shape
             )
-        excess, condition, fast = judge(self._scaling, self._way, sensed, True, after)
+        excess, condition, fast = judge(self._scaling, self._way, sensed, settled, after)
         contact = bool(after.state[0])
         link = self._link(after.rows[1]) if contact else None
         zero = read_only(after.rows[0].copy())
@@ -157,11 +158,7 @@ class ContactDetector:
         SensingError
             when the thresholds are of other joints or the log is of another rate.
         """
-        if log.joint_names != self.thresholds.joint_names:
-            raise SensingError(
-                "thresholds of another robot", where=log.name, expected=", ".join(self.thresholds.joint_names),
-                got=", ".join(log.joint_names),
-            )  # fmt: skip
+        self.check_joints(log.joint_names, where=log.name)
         if not abs(log.step / self.step - 1.0) < _OFF_RATE:
             raise SensingError(
                 "samples of another rate", where=log.name, expected=f"{self.step} s", got=f"{log.step} s"
@@ -176,6 +173,18 @@ class ContactDetector:
             touched=out[:, 0] > 0.0, excess=out[:, 1].copy(), resting=np.isin(out[:, 2], (SETTLING, RESTING)),
             fast=out[:, 3] > 0.0, zero=zero,
         )  # fmt: skip
+
+    def check_joints(self, names: tuple[str, ...], *, where: str) -> None:
+        """Pass where the thresholds are of these joints.
+
+        Raises
+        ------
+        SensingError
+            when they are of others.
+        """
+        if names != self.thresholds.joint_names:
+            expected = ", ".join(self.thresholds.joint_names)
+            raise SensingError("thresholds of another robot", where=where, expected=expected, got=", ".join(names))
 
     def _event(self, log: SensedLog, out: FloatArray, told: FloatArray, zero: FloatArray, span: slice) -> ContactEvent:
         top = span.start + int(out[span, 1].argmax())

@@ -58,7 +58,7 @@ def observe(body, plan, sample, memory, out):  # type: ignore[no-untyped-def]
     _filtered(body[4], numbers, sample, (rows, bent), work[_ACCELERATION])
     _modelled(body, rows, work, links_work, mass)
     if rest[0] == THERMAL:
-        add_warm_friction(rows, work[_FRICTION])
+        add_warm_friction(heat, rows, work[_FRICTION])
     _pushed(rest, rows, work, out[4])
     if rest[0] == INVERSE:
         for i in range(rows.shape[1]):

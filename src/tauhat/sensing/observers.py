@@ -44,6 +44,11 @@ class Observer(ABC):
         if not 0.0 < self.gain < np.inf:
             raise SensingError("gain of an observer", where=self.key, expected="above zero", got=f"{self.gain} 1/s")
 
+    @property
+    def lag(self) -> float:
+        """Mean delay of a smooth external torque beside that of the filter [s]."""
+        return 1.0 / self.gain
+
     def gains(self, model: SensedModel, step: float) -> FloatArray:
         """Return what the kernel reads, (n_v, 6), for samples `step` seconds apart."""
         gains = np.zeros((model.n_v, N_GAINS))
@@ -91,6 +96,11 @@ class SecondOrderMomentumObserver(Observer):
 
     key: ClassVar[str] = "momentum-2"
     kind: ClassVar[int] = kernel.SECOND
+
+    @property
+    def lag(self) -> float:
+        """Mean delay of a smooth external torque beside that of the filter [s]."""
+        return float(2.0 / (_SECOND_ORDER * self.gain))
 
     def _own(self, model: SensedModel, step: float) -> FloatArray:  # noqa: ARG002
         pole = _SECOND_ORDER * self.gain
@@ -147,6 +157,11 @@ class KalmanObserver(Observer):
 
     key: ClassVar[str] = "kalman"
     kind: ClassVar[int] = kernel.KALMAN
+
+    @property
+    def lag(self) -> float:
+        """Mean delay of a smooth external torque beside that of the filter [s]."""
+        return float(np.sqrt(2.0) / (_BUTTERWORTH * self.gain))
 
     def _own(self, model: SensedModel, step: float) -> FloatArray:  # noqa: ARG002
         moving = np.array([[1.0, step], [0.0, 1.0]])

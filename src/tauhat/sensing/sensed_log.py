@@ -58,12 +58,15 @@ class SensedLog:
     step : between samples [s]
     t : (n_t,) of the samples that were taken [s]
     rows : (n_t,) their places in the log
-    q, dq : (n_t, n_v) filtered position and velocity
+    q : (n_t, n_v) position to which the torque belongs, as late as it is
+    dq : (n_t, n_v) filtered velocity
     tau, tau_std : (n_t, n_v) external torque and its standard error [Nm or N]
     raw : (n_t, n_v) external torque since the sample before, not smoothed [Nm or N]
     wrench, wrench_std : (n_t, 6) force, then moment [N, Nm]
     settled : (n_t,) whether the last start is forgotten
     counts : of samples
+    lag : (n_t, n_v) what the torque changed by within the observer's delay; `wrench_std` holds it [Nm or N]
+    believed : of how many samples the time stamps were believed; of the others they count periods
     """
 
     name: str
@@ -83,9 +86,11 @@ class SensedLog:
     wrench_std: FloatArray
     settled: NDArray[np.bool_]
     counts: SampleCounts
+    lag: FloatArray
+    believed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("t", "rows", "q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled"):
+        for name in ("t", "rows", "q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled", "lag"):
             read_only(getattr(self, name))
 
     @property
@@ -116,6 +121,7 @@ class SensedLog:
             "settled": int(np.count_nonzero(self.settled)),
             "skipped": {name: getattr(self.counts, name) for name in ("late", "repeated", "not_finite")},
             "restarts": self.counts.restarts,
+            "stamps_believed": self.believed,
             "joints": [
                 {"name": name, **size._asdict()}
                 for name, size in zip(self.joint_names, self.sizes(self.tau, self.tau_std), strict=True)

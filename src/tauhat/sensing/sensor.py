@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -14,14 +15,19 @@ from tauhat.recordings.log import Log
 from tauhat.recordings.recording import Recording
 from tauhat.robots.fitting import check_joint_order
 from tauhat.sensing import sensor_kernel as kernel
+from tauhat.sensing import stamp_kernel as stamp
 from tauhat.sensing.causal_filter import CausalFilter
-from tauhat.sensing.observer_kernel import DISTURBANCE, ROWS
+from tauhat.sensing.observer_kernel import DISTURBANCE
 from tauhat.sensing.observers import MomentumObserver, Observer
 from tauhat.sensing.sensed_log import SampleCounts, SensedLog
 from tauhat.sensing.sensed_model import SensedModel, sensed_model
 from tauhat.sensing.torque_observer import TorqueObserver
 from tauhat.sensing.wrench import WrenchSolver
 
+Stamps: TypeAlias = Literal["auto", "exact", "jittered"]
+"""Whether samples were taken at their time stamps, or evenly with stamps that jitter; auto: as positions tell."""
+
+STAMPS: Mapping[str, int] = {"auto": stamp.AUTO, "exact": stamp.EXACT, "jittered": stamp.JITTERED}
 CUTOFF = 10.0  # [Hz]
 OFF_RATE = 0.05  # a clock further off than this is another one
 _OF_RATE = 0.45  # the highest cut-off in parts of the rate
@@ -35,10 +41,12 @@ class Sensed(NamedTuple):
     """What one sample told.
 
     tau, variance : (n_v,) external torque and its variance [Nm or N]
-    q, dq : (n_v,) filtered position and velocity to which it belongs
+    q : (n_v,) position to which it belongs, as late as it is
+    dq : (n_v,) filtered velocity
     raw : (n_v,) mean external torque since the sample before, not smoothed
     wrench : (6,) force, then moment, at the frame [N, Nm]
     covariance : (6, 6) of the wrench
+    settled : whether the last start is forgotten
     """
 
     tau: FloatArray
@@ -48,6 +56,7 @@ class Sensed(NamedTuple):
     raw: FloatArray
     wrench: FloatArray
     covariance: FloatArray
+    settled: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,6 +71,7 @@ class ForceSensor:
     cutoff : of the filter that position and torque share [Hz]; 10, or what the rate allows
     delay : how much later than the torque the position was logged [s]; the torque then waits, else the position
     wrench : frame and directions; a full wrench at the robot's last frame by default
+    stamps : what time stamps say; `auto` is told by the positions, in motion within a second
     """
 
     model: SensedModel
@@ -70,6 +80,7 @@ class ForceSensor:
     cutoff: float | None = None
     delay: float = 0.0
     wrench: WrenchSolver | None = None
+    stamps: Stamps = "auto"
     _machine: tuple[Any, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -77,6 +88,8 @@ class ForceSensor:
             raise SensingError("rate of the samples", expected="above zero", got=f"{self.rate} Hz")
         if not abs(self.delay) < 1.0:
             raise SensingError("delay of a channel", expected="below 1 s", got=f"{self.delay} s")
+        if self.stamps not in STAMPS:
+            raise SensingError("time stamps", expected=", ".join(STAMPS), got=str(self.stamps)[:60])
         solver = self.wrench or WrenchSolver(robot=self.model.robot)
         if solver.robot.fingerprint != self.model.robot.fingerprint:
             raise SensingError("the wrench is of another robot", expected=self.model.robot.name, got=solver.robot.name)
@@ -84,8 +97,9 @@ class ForceSensor:
         object.__setattr__(self, "wrench", solver)
         object.__setattr__(self, "cutoff", cutoff)
         observer = TorqueObserver(model=self.model, step=self.step, observer=self.observer, cutoff=cutoff)
-        numbers = np.array([self.step, self._forgetting(cutoff), self.delay * self.rate, self.longest_bridged])
-        limits = read_only(numbers), read_only(self.model.strength)
+        numbers = [self.step, self._forgetting(cutoff), self.delay * self.rate, self.longest_bridged]
+        numbers += [STAMPS[self.stamps], np.exp(-self.step / self.observer.lag)]
+        limits = read_only(np.array(numbers)), read_only(self.model.strength)
         object.__setattr__(self, "_machine", (*observer.parts, solver.task, limits))
 
     @property
@@ -111,8 +125,9 @@ class ForceSensor:
     def start(self) -> FloatArray:
         """Return the memory before the first sample."""
         ring = 0 if self.delay == 0.0 else int(abs(self.delay) * self.rate) + 2
-        size = kernel.CLOCK + (2 + ROWS + ring) * self.n_v + 2 * self.model.bristles.size
-        return read_only(np.where(np.arange(size) < kernel.CLOCK, np.nan, 0.0))
+        memory = np.zeros(kernel.size_of(self.n_v, self.model.bristles.size, ring))
+        memory[stamp.LATEST], memory[stamp.BELIEVED] = np.nan, float(self.stamps == "exact")
+        return read_only(memory)
 
     def advance(self, memory: FloatArray, q: FloatArray, tau: FloatArray) -> tuple[FloatArray, Sensed]:
         """Return the memory one period later and what the sample told.
@@ -126,7 +141,7 @@ class ForceSensor:
         SensingError
             when the sample is not finite, or the observer needs a mass matrix of a body and the model has none here.
         """
-        last = memory[0]
+        last = memory[stamp.LATEST]
         t = 0.0 if np.isnan(last) else last + self.step
         after, sensed, code = self.take(memory, t, q, tau)
         if sensed is None:
@@ -136,7 +151,7 @@ class ForceSensor:
     def take(
         self, memory: FloatArray, t: float, q: FloatArray, tau: FloatArray
     ) -> tuple[FloatArray, Sensed | None, int]:
-        """Return the memory behind a stamped sample, what it told if it was taken, and a code of `sensor_kernel`.
+        """Return the memory behind a stamped sample, what it told if it was taken, and a code of `stamp_kernel`.
 
         Parameters
         ----------
@@ -153,14 +168,15 @@ class ForceSensor:
             raise SensingError("a sample of another robot", expected=f"{n_v} joints", got=f"{len(q)} and {len(tau)}")
         stamped = np.empty(1 + 2 * n_v)
         stamped[0], stamped[1 : 1 + n_v], stamped[1 + n_v :] = t, q, tau
-        state, out = memory.copy(), (np.empty((5, n_v)), np.empty((7, 6)))
+        state, out = memory.copy(), (np.empty((kernel.OUT, n_v)), np.empty((7, 6)))
         code = kernel.take_one(self._machine, stamped, state, out)
-        if code == kernel.NO_BODY:
+        if code == stamp.NO_BODY:
             raise self._no_body()
-        if code > kernel.RESTARTED:
+        if code > stamp.RESTARTED:
             return state, None, code
-        tau, variance, q, dq, raw = out[0]
-        return state, Sensed(tau, variance, q, dq, raw, out[1][0], out[1][1:]), code
+        tau, variance, q, dq, raw, _ = out[0]
+        settled = kernel.behind_start(self._machine[3][0][1] * state[stamp.AGE]) < kernel.SETTLED
+        return state, Sensed(tau, variance, q, dq, raw, out[1][0], out[1][1:], bool(settled)), code
 
     def along(self, log: Recording | Log) -> SensedLog:
         """Return what is sensed along a log; causal: a sample knows none after it.
@@ -189,16 +205,17 @@ class ForceSensor:
 
     def _sensed(self, log: Recording | Log, codes: IntArray, results: tuple[Any, ...]) -> SensedLog:
         solver = self.wrench or WrenchSolver(robot=self.model.robot)
-        rows = np.flatnonzero(codes <= kernel.RESTARTED)
+        rows = np.flatnonzero(codes <= stamp.RESTARTED)
         if not rows.size:
             raise SensingError("no sample of the log can be used", where=log.name, got=f"{log.n_t} samples")
-        names = ("q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled")
+        names = ("q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled", "lag")
         joints = self.model.robot.joints
         return SensedLog(
             name=log.name, joint_names=tuple(joint.name for joint in joints),
             prismatic=tuple(joint.name for joint in joints if joint.effort_unit == "N"),
             frame=str(solver.frame), axes=solver.axes, step=self.step, t=np.array(log.t[rows]), rows=rows,
-            counts=counted(codes), **dict(zip(names, results, strict=True)),
+            counts=counted(codes), believed=int(np.count_nonzero(results[-1])),
+            **dict(zip(names, results[:-1], strict=True)),
         )  # fmt: skip
 
     def _check_rate(self, log: Recording | Log) -> None:
@@ -228,13 +245,14 @@ def force_sensor(
     observer: Observer | None = None,
     cutoff: float | None = None,
     wrench: WrenchSolver | None = None,
+    stamps: Stamps = "auto",
 ) -> ForceSensor:
     """Return the force sensor that an estimate makes of a robot.
 
     Parameters
     ----------
     rate : of the samples [Hz]
-    observer, cutoff, wrench : as of `ForceSensor`
+    observer, cutoff, wrench, stamps : as of `ForceSensor`
 
     Raises
     ------
@@ -245,7 +263,7 @@ def force_sensor(
     """
     return ForceSensor(
         model=sensed_model(estimate), rate=rate, observer=observer or MomentumObserver(), cutoff=cutoff,
-        delay=estimate.processing.delay, wrench=wrench,
+        delay=estimate.processing.delay, wrench=wrench, stamps=stamps,
     )  # fmt: skip
 
 
@@ -268,11 +286,11 @@ def usual_step(t: FloatArray) -> float:
 
 def counted(codes: IntArray) -> SampleCounts:
     """Return how many samples were taken and why others were not, by their codes in order."""
-    counts = np.bincount(codes, minlength=kernel.NO_BODY)
-    taken = int(counts[kernel.TAKEN] + counts[kernel.RESTARTED])
+    counts = np.bincount(codes, minlength=stamp.NO_BODY)
+    taken = int(counts[stamp.TAKEN] + counts[stamp.RESTARTED])
     return SampleCounts(
-        taken=taken, late=int(counts[kernel.LATE]), repeated=int(counts[kernel.REPEATED]),
-        not_finite=int(counts[kernel.NOT_FINITE]), restarts=max(0, int(counts[kernel.RESTARTED]) - 1),
+        taken=taken, late=int(counts[stamp.LATE]), repeated=int(counts[stamp.REPEATED]),
+        not_finite=int(counts[stamp.NOT_FINITE]), restarts=max(0, int(counts[stamp.RESTARTED]) - 1),
     )  # fmt: skip
 
 
@@ -296,4 +314,5 @@ def _torque(model: SensedModel, log: Recording | Log) -> FloatArray:
 
 
 def _results(n_t: int, n_v: int) -> tuple[Any, ...]:
-    return (*(np.empty((n_t, n)) for n in (*[n_v] * 5, 6, 6)), np.empty(n_t, dtype=np.bool_))
+    flags = (np.empty(n_t, dtype=np.bool_) for _ in range(2))
+    return (*(np.empty((n_t, n)) for n in (*[n_v] * 5, 6, 6)), next(flags), np.empty((n_t, n_v)), next(flags))

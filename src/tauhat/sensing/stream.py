@@ -5,8 +5,8 @@ What becomes of a sample:
     not after the last one                        skipped, `late` or `repeated`; 50 in a row: the clock was set back
     within five periods (or 20 ms) of the last    taken; lost samples between are put back on straight lines
     later than that                               taken, and everything starts again with wide error bars
-Stamps that jitter count as whole periods (see `sensor_kernel`). The rate is judged over 100 samples at a time: the
-usual step has to be the sensor's within 5 %.
+Stamps are believed or counted as whole periods, as positions tell (see `stamp_kernel`). The rate is judged over 100
+samples at a time: the usual step has to be the sensor's within 5 %.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.sensing import sensor_kernel as kernel
+from tauhat.sensing import stamp_kernel as stamp
 from tauhat.sensing.sensed_log import SampleCounts
 from tauhat.sensing.sensor import OFF_RATE, ForceSensor, Sensed, usual_step
 
@@ -66,7 +66,7 @@ class SensorStream:
         counts = _with(memory.counts, code)
         times = memory.times
         if sensed is not None:
-            times = self._judged((t,) if code == kernel.RESTARTED else (*times, t))
+            times = self._judged((t,) if code == stamp.RESTARTED else (*times, t))
         return StreamMemory(after, times, counts), sensed
 
     def _judged(self, times: tuple[float, ...]) -> tuple[float, ...]:
@@ -80,8 +80,8 @@ class SensorStream:
 
 
 def _with(counts: SampleCounts, code: int) -> SampleCounts:
-    if code > kernel.RESTARTED:
-        name = {kernel.LATE: "late", kernel.REPEATED: "repeated"}.get(code, "not_finite")
+    if code > stamp.RESTARTED:
+        name = {stamp.LATE: "late", stamp.REPEATED: "repeated"}.get(code, "not_finite")
         return counts._replace(**{name: getattr(counts, name) + 1})
-    again = int(code == kernel.RESTARTED and counts.taken > 0)
+    again = int(code == stamp.RESTARTED and counts.taken > 0)
     return counts._replace(taken=counts.taken + 1, restarts=counts.restarts + again)

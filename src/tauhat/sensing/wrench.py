@@ -78,14 +78,14 @@ class WrenchSolver:
     directions : (6, k) unit wrenches, force then moment; all others are taken to be zero
     axes : whose axes directions and results are along
     largest : conceivable force and moment, as standard deviations [N, Nm]: where joints cannot tell, the answer is
-        zero plus or minus this
+        zero plus or minus this; raise it for arms that push with more than twice as much
     """
 
     robot: Robot
     frame: str | None = None
     directions: FloatArray = field(default_factory=lambda: DIRECTIONS["wrench"])
     axes: Axes = "base"
-    largest: tuple[float, float] = (1000.0, 200.0)
+    largest: tuple[float, float] = (300.0, 60.0)
     _links: NDArray[np.void] = field(init=False, repr=False)
     _place: tuple[Any, ...] = field(init=False, repr=False)
     _spread: FloatArray = field(init=False, repr=False)

@@ -109,7 +109,7 @@ def zeroed(sensed: SensedLog, zero: FloatArray, *, solver: WrenchSolver) -> Sens
         when the zero has another shape.
     """
     tau = sensed.tau - frozen("zero", zero, sensed.tau.shape, where=sensed.name)
-    found = solver.along(sensed.q, tau, np.square(sensed.tau_std))
+    found = solver.along(sensed.q, tau, np.square(sensed.tau_std) + np.square(sensed.lag))
     return replace(sensed, tau=tau, wrench=found.wrench, wrench_std=found.standard_errors, frame=str(solver.frame))
 
 

@@ -72,6 +72,13 @@ class Options:
             help="What the arm carries and the estimate does not know: what `tauhat payload --json` prints.",
         ),
     ] = None  # fmt: skip
+    stamps: Annotated[
+        Literal["auto", "exact", "jittered"],
+        typer.Option(
+            "--stamps",
+            help="Samples were taken at their time stamps, or evenly with stamps that jitter; auto: as positions tell.",
+        ),
+    ] = "auto"
     free: Annotated[
         list[Path] | None,
         typer.Option(
@@ -122,11 +129,13 @@ def run(options: Options) -> None:
     choice = SensorChoice(
         estimate=options.estimate, observer=options.observer, gain=options.gain, cutoff=options.cutoff,
         frame=options.frame, directions=options.directions, axes=options.axes, tool=options.tool,
+        stamps=options.stamps,
     )  # fmt: skip
     if options.stream is not None:
         from tauhat.cli.sensing_lines import answer
 
-        answer(choice.sensor(_streamed_rate(options)))
+        sensor = choice.sensor(_streamed_rate(options))
+        answer(sensor, _contacts(options).limits(sensor) if options.free or options.thresholds else None)
         return
     if not options.logs:
         raise typer.BadParameter("a LOG, or --input - for samples from standard input")
@@ -164,10 +173,9 @@ def _streamed_rate(options: Options) -> float:
         ("LOG", options.logs),
         ("-o", options.output),
         ("--report", options.report),
-        ("--map", options.map_file),
     ]
     taken += [("--rows", options.rows), ("--json", options.as_json)]
-    taken += [("--free", options.free), ("--thresholds", options.thresholds)]
+    taken += [] if options.free else [("--map", options.map_file)]
     for name, value in taken:
         if value:
             raise typer.BadParameter(
