@@ -27,6 +27,7 @@ _SYMBOLS = {
     "Fs": "Stribeck friction, on top at low speed",
     "Fd, Fe": "dry friction that builds up over a short and over a longer displacement",
     "Fl": "friction as a part of the rigid-body torque on the joint",
+    "Hd, Hv": "change of dry and of viscous friction by one unit of the joint's warmth",
     "Fva": "half the difference of viscous friction forwards and backwards",
     "Fv+, Fv-, Fc+, Fc-": "viscous and Coulomb friction forwards and backwards",
     "k0, k1, k2, k3, k4": "friction as a polynomial of the speed, and its Stribeck part k4",
