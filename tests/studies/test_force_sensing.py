@@ -15,8 +15,9 @@ from tauhat.sensing import OBSERVERS, ForceSensor, force_sensor
 from tauhat.sensing.free_motion import learnt_from_free_motion
 from tauhat.sensing.wrench import WrenchSolver, directions_named
 from tauhat.studies.force_sensing import ForceSensingStudy
+from tauhat.studies.force_sensing.chapters import chapters_of, summary_of
+from tauhat.studies.force_sensing.findings import Findings
 from tauhat.studies.force_sensing.scene import ContactScene, SceneSettings
-from tauhat.studies.force_sensing.trials import Trial, tried
 from tauhat.workers import LocalWorkers
 
 SMALL = SceneSettings(warm_up=20.0, time_constant=15.0, rate=100.0)
@@ -72,23 +73,27 @@ def test_free_motion_teaches_the_error_of_what_it_shows(scene, sensor):
         learnt_from_free_motion(sensor, [])
 
 
-def test_the_study_tries_every_observer_on_every_log():
-    result = ForceSensingStudy(seeds=1, first_seed=3, scene=SMALL, terms="plain").run(LocalWorkers(count=1))
-    forces = result.chapters[1].tables[0]
+@pytest.fixture(scope="module")
+def found() -> Findings:
+    return ForceSensingStudy(seeds=1, first_seed=3, scene=SMALL, terms="plain").found(LocalWorkers(count=1))
+
+
+def test_the_study_tries_every_observer_on_every_log(found):
+    chapters = chapters_of(found)
+    forces = chapters[1].tables[0]
     assert [row[0] for row in forces.rows] == list(OBSERVERS)
     for row in forces.rows:
         assert all(0.0 < value < 60.0 for value in row[1:])
-    shares = np.array([row[1:] for row in result.chapters[2].tables[0].rows])
+    shares = np.array([row[1:] for row in chapters[2].tables[0].rows])
     assert ((shares > 50.0) & (shares <= 100.0)).all()
-    ((_, without, with_warmth, ratio),) = result.chapters[3].tables[0].rows
+    ((_, without, with_warmth, ratio),) = chapters[3].tables[0].rows
     assert with_warmth < without
     assert ratio == pytest.approx(with_warmth / without)
-    assert "1 arms" in result.summary
+    assert "1 arms" in summary_of(found)
 
 
-def test_figures_are_those_of_a_sensor_used_by_hand(scene, sensor):
-    outcomes = tried(Trial(scene=SMALL, seed=3, terms="plain", directions="force"))
-    found = next(o for o in outcomes if (o.observer, o.pace, o.warmth) == ("momentum", "moving", "cold"))
+def test_figures_are_those_of_a_sensor_used_by_hand(scene, sensor, found):
+    (outcome,) = found.of("momentum", pace="moving", warmth="cold")
     logs = [log for warmth in ("cold", "warm") for log in scene.in_air(warmth)]
     solver = WrenchSolver(robot=scene.robot, directions=directions_named("force"))
     by_hand = learnt_from_free_motion(replace(sensor, wrench=solver), logs)
@@ -97,8 +102,8 @@ def test_figures_are_those_of_a_sensor_used_by_hand(scene, sensor):
     assert sensed.rows.size == log.recording.n_t
     later = slice(156, None)  # 1.5 s and 0.06 s at 100 Hz
     error = np.linalg.norm(sensed.wrench[later, :3] - log.force[150:-6], axis=1)
-    assert found.force_rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
-    assert found.force_95 == pytest.approx(np.quantile(error, 0.95), rel=1e-9)
+    assert outcome.force_rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
+    assert outcome.force_95 == pytest.approx(np.quantile(error, 0.95), rel=1e-9)
 
 
 @pytest.mark.parametrize(

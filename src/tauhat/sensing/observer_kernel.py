@@ -11,14 +11,14 @@ The observers smooth e, each exact for the sample time (tau_ext constant between
     2 momentum, 2nd order  r'' = K^2 (e - r) - 2 K r', both eigenvalues at -K
     3 sliding mode         super-twisting on p, implicit, so that it does not chatter; then as 1
     4 disturbance          tau' = X^-1 M^-1 (M y'' + b + sliding - T - tau), implicit, without y''
-    5 Kalman               p+ = p + h (drive + d), d+ = phi d, corrected by the measured p with constant gains
+    5 Kalman               p+ = p + h (drive + d), d+ = d, corrected by the measured p with constant gains
     6 thermal              1, with friction that warms up beside it (`thermal_kernel`)
 The variance adds the model's error, `rms^2`, and what is not known of the bristles: `(weight load)^2 P`, with
 `P+ = P exp(-2 |moved| / w) + P_slid (1 - exp(-2 |moved| / w))`, and no less than `P_turned` behind a reversal.
 
 `rows` is the memory, (ROWS, n_v): 0 position as measured (nan at the start), 1-2 y, y', 3-4 T, T', 5 u, 6 p, 7 drive,
 8-10 the observer's own, 11 load, 12 direction, 13-20 warmth (6 alone). `bent` (2, n_bristles): states and their
-variances. `plan` is the filter's 10 numbers, the observer's gains (n_v, 6), the model's error rms (n_v,); kind, h,
+variances. `plan` is the filter's 10 numbers, the observer's gains (n_v, 4), the model's error rms (n_v,); kind, h,
 P_start, P_turned, P_slid; and `heat` of `thermal_kernel`, empty but for 6.
 Filled: `out` (5, n_v): tau_ext, its variance, y, y', e.
 
@@ -174,7 +174,7 @@ def _smoothed(kind, gain, h, pushed, row):  # type: ignore[no-untyped-def]
     off = p - (row[8] + h * (drive + row[9]))
     if kind == KALMAN:
         row[8] = p - off + gain[0] * off
-        row[9] = gain[2] * row[9] + gain[1] * off
+        row[9] += gain[1] * off
         return row[9]
     k1, k2 = gain[0], gain[1]
     least = h * h * k2

@@ -17,7 +17,7 @@ from tauhat.robots.naming import advice_on_name
 from tauhat.sensing import observer_kernel as kernel
 from tauhat.sensing.sensed_model import SensedModel
 
-N_GAINS = 6
+N_GAINS = 4
 # Half of a step comes through after ln 2 / K at first order, after 1.678 / K with two eigenvalues at -K, and after
 # 1.43 / w for a Butterworth pair: one gain means one response time, whatever the observer.
 _SECOND_ORDER = 1.678 / np.log(2.0)
@@ -50,7 +50,7 @@ class Observer(ABC):
         return 1.0 / self.gain
 
     def gains(self, model: SensedModel, step: float) -> FloatArray:
-        """Return what the kernel reads, (n_v, 6), for samples `step` seconds apart."""
+        """Return what the kernel reads, (n_v, 4), for samples `step` seconds apart."""
         gains = np.zeros((model.n_v, N_GAINS))
         own = self._own(model, step)
         gains[:, : own.shape[-1]] = own
@@ -169,7 +169,7 @@ class KalmanObserver(Observer):
         noise = ratio * np.array([[step**2 / 3.0, step / 2.0], [step / 2.0, 1.0]]) * step
         covariance = solve_discrete_are(moving.T, np.array([[1.0], [0.0]]), noise, np.eye(1))
         kept = covariance[:, 0] / (covariance[0, 0] + 1.0)
-        return np.array([kept[0], kept[1], 1.0])
+        return np.asarray(kept)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

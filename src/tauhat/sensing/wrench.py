@@ -181,8 +181,10 @@ def _along(task, q, torque, out):  # type: ignore[no-untyped-def]
 def turn_directions(directions, rotation, out):  # type: ignore[no-untyped-def]
     """Fill `out` (6, k) with directions of the frame's axes in base axes; `rotation` holds its 9 numbers row by row."""
     for a in range(directions.shape[1]):
-        for half in range(0, 6, 3):
-            for r in range(3):
-                out[half + r, a] = 0.0
-                for c in range(3):
-                    out[half + r, a] += rotation[3 * r + c] * directions[half + c, a]
+        for r in range(6):
+            own, first = 3 * (r % 3), r - r % 3
+            out[r, a] = (
+                rotation[own] * directions[first, a]
+                + rotation[own + 1] * directions[first + 1, a]
+                + rotation[own + 2] * directions[first + 2, a]
+            )
