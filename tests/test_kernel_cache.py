@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import tauhat
 from tauhat.kernel_cache import forget_older_kernels
 
 MAIN = """
@@ -63,6 +65,15 @@ def test_within_one_version_nothing_is_deleted(tmp_path: Path) -> None:
     forget_older_kernels(place, "1.0")  # back again: that one is unknown by now
     assert kept(place) == []
     assert [path.name for path in (place / "__pycache__").glob("kernels-*")] == ["kernels-1.0"]
+
+
+def test_this_package_forgets_its_own_older_kernels_when_it_is_imported(tmp_path: Path) -> None:
+    shutil.copytree(Path(tauhat.__file__).parent, tmp_path / "tauhat", ignore=shutil.ignore_patterns("__pycache__"))
+    place = tmp_path / "tauhat" / "dynamics" / "__pycache__"
+    place.mkdir()
+    (place / "old_kernel.step-1.py311.1.nbc").write_text("")
+    subprocess.run([sys.executable, "-c", "import tauhat"], cwd=tmp_path, check=True)
+    assert kept(tmp_path) == []
 
 
 def test_other_files_stay_and_a_folder_that_cannot_be_made_is_no_error(tmp_path: Path) -> None:

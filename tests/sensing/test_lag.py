@@ -89,11 +89,10 @@ def test_in_fast_motion_error_bars_contain_the_force(name, constant):
     assert inside > (0.95 if constant else 0.91)
 
 
-@pytest.mark.parametrize("observer", ["momentum-2", "kalman", "sliding-mode", "inverse-dynamics", "disturbance"])
+@pytest.mark.parametrize("observer", [name for name in OBSERVERS if name not in {"momentum", "thermal"}])
 def test_with_every_observer_error_bars_contain_the_force(observer):
     _, parts = force_errors([sensed("ur5e", seed, constant=True, observer=observer) for seed in range(2)])
     assert np.mean(np.abs(parts) < 1.96) > 0.93
-    assert observer in OBSERVERS
 
 
 def test_solving_where_the_arm_was_is_better_than_where_it_is():
@@ -128,4 +127,6 @@ def test_what_changed_within_the_lag_is_in_the_wrench_and_not_in_the_torque():
     solver = WrenchSolver(robot=MODELS["ur5e"].robot)
     without = solver.along(run.q, run.tau, np.square(run.tau_std)).standard_errors
     assert (run.wrench_std[during & settled] >= without[during & settled] - 1e-9).all()
+    grown_bar = (run.wrench_std / without)[during & settled].max(axis=1)
+    assert np.median(grown_bar) > 1.5  # all but where joints tell nothing and the largest wrench is the bar
     assert run.wrench_std[calm & settled] == pytest.approx(without[calm & settled], rel=0.1)

@@ -148,7 +148,7 @@ def _view(document: dict[str, Any]) -> Iterator[RenderableType]:
     for motion in document["motions"]:
         yield unbroken(f"Written: {motion['motion']} ({motion['seconds']:.1f} s)")
     for program in document["programs"]:
-        yield unbroken(f"Written: {program['program']} ({program['language']}, runs {program['repeats']} times)")
+        yield unbroken(f"Written: {program['program']} ({program['language']}, runs: {program['repeats']})")
     if document["report"] is not None:
         yield unbroken(f"Written: {document['report']}")
     yield from map(Text, _unsaid(document["programs"]))

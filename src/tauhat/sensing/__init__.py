@@ -8,6 +8,7 @@ from tauhat.sensing.contact_thresholds import (
     learn_contact_thresholds,
     load_contact_thresholds,
 )
+from tauhat.sensing.free_motion import learnt_from_free_motion
 from tauhat.sensing.observers import OBSERVERS, Observer, observer_named
 from tauhat.sensing.payload_check import PayloadCheck, check_payload
 from tauhat.sensing.sensed_log import SampleCounts, SensedLog
@@ -50,6 +51,7 @@ __all__ = [
     "directions_named",
     "force_sensor",
     "learn_contact_thresholds",
+    "learnt_from_free_motion",
     "load_contact_thresholds",
     "load_tool",
     "observer_named",

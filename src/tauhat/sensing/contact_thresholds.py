@@ -330,7 +330,7 @@ def _spread(free: Sequence[_FreeLog], scale: FloatArray) -> float:
 def _warn(found: ContactThresholds) -> None:
     if not found.keeps_rate:
         warnings.warn(
-            f"{found.seconds.sum():.0f} s of free motion can promise {found.promised:.3g} false alarms an hour, "
+            f"{found.seconds.sum():.0f} s of free motion can promise {found.promised:.0f} false alarms an hour, "
             f"{found.rate:g} were asked for: thresholds are {found.rules.margin:g} x the largest residual; "
             "give more recordings without contact",
             TauhatWarning,

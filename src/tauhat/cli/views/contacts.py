@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from tauhat.cli.views.tables import table
+from tauhat.report.formatting import number
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -39,6 +40,6 @@ def _worth(thresholds: ContactThresholds) -> str:
     if thresholds.keeps_rate:
         return f"thresholds allow {thresholds.rate:g} false ones an hour."
     return (
-        f"{thresholds.seconds.sum():.0f} s of free motion can promise {thresholds.promised:.3g} false ones an hour, "
-        f"{thresholds.rate:g} were asked for."
+        f"{thresholds.seconds.sum():.0f} s of free motion can promise {number(thresholds.promised)} false ones "
+        f"an hour, {thresholds.rate:g} were asked for."
     )

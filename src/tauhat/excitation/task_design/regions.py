@@ -210,11 +210,11 @@ class PathRegion(TaskRegion):
         return np.asarray(np.maximum(nearest - self.clearance, 0.0))
 
     def outline(self) -> tuple[FloatArray, ...]:
-        """Return the path, and four lines along the tube's wall where it has one."""
+        """Return the path, and six lines along the tube's wall where it has one."""
         path = self._points()
         if self.clearance == 0.0:
             return (read_only(path),)
-        sides = [pose.rotation[:, axis] * sign for pose in self.poses[:1] for axis in (0, 1) for sign in (1.0, -1.0)]
+        sides = [pose.rotation[:, axis] * sign for pose in self.poses[:1] for axis in (0, 1, 2) for sign in (1.0, -1.0)]
         return (read_only(path), *(read_only(path + self.clearance * side) for side in sides))
 
     def _points(self) -> FloatArray:

@@ -78,7 +78,7 @@ class StageSearch:
         if motion.duration > self.space.stage.seconds:
             return ExcitationError(
                 "no program is short enough", where=where, expected=f"{self.space.stage.seconds:g} s",
-                got=f"{motion.duration:.1f} s", remedy="more seconds, fewer points, or faster moves",
+                got=f"{motion.duration:.1f} s", remedy="more seconds, fewer points, faster moves, or a larger search",
             )  # fmt: skip
         samples = sampled(motion, FINE)
         limit = min(self.others, key=lambda each: self.room(samples, each))
