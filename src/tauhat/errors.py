@@ -52,6 +52,10 @@ class ModelError(TauhatError):
     """A torque model that cannot be built or identified."""
 
 
+class ControlError(TauhatError):
+    """A force-controlled job that cannot be set up, or a command beyond what was checked."""
+
+
 class EstimateError(TauhatError):
     """An estimate file that is damaged, too new or of another robot."""
 
@@ -66,6 +70,10 @@ class SimulationError(TauhatError):
 
 class SensingError(TauhatError):
     """A force cannot be sensed: settings, samples or an estimate that do not fit."""
+
+
+class LiveError(TauhatError):
+    """A server of live samples that cannot start, a client or message it refuses, a robot that does not answer."""
 
 
 class ExportError(TauhatError):
