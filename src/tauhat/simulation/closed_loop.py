@@ -152,7 +152,7 @@ def follow(
     """
     feedforward = np.ascontiguousarray(course.feedforward(pilot.controller))
     log = np.empty((course.samples, len(CHANNELS), running.plant.robot.n_v))
-    with _silent(running.simulator.mujoco):
+    with silent(running.simulator.mujoco):
         if isinstance(pilot.controller, TrackingLaw) and environment is None and running.native:
             _follow_in_kernel(running, pilot, course, feedforward=feedforward, law=pilot.controller, log=log)
         else:
@@ -281,7 +281,7 @@ def _runaway(running: RunningPlant, t: float) -> SimulationError:
 
 
 @contextmanager
-def _silent(mujoco: Any) -> Iterator[None]:
+def silent(mujoco: Any) -> Iterator[None]:
     """Keep MuJoCo from writing MUJOCO_LOG.TXT into the working directory; divergence is reported as an error."""
     previous = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)

@@ -49,7 +49,7 @@ def run_loop(machine, x, memory, steering, course, log):  # type: ignore[no-unty
         if _ran_away(engine, course.fastest):
             return step
         row = step - course.settle
-        _observe(engine, x, steering, step)
+        observe(engine, x, steering, step)
         _command(steering, course, step, x)
         logged = row // course.stride if row >= 0 else 0
         if row >= 0 and row % course.stride == 0:
@@ -68,7 +68,7 @@ def _ran_away(engine, fastest):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _observe(engine, x, steering, step):  # type: ignore[no-untyped-def]
+def observe(engine, x, steering, step):  # type: ignore[no-untyped-def]
     """Read the encoders."""
     c = steering.rows
     for j in range(x.shape[1]):

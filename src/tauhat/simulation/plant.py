@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -24,6 +25,9 @@ FRICTION_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 FRICTION_TIME_STEPS = 2.0
 # Costs nothing at one iteration a step; with MuJoCo's 1e-8 single samples miss the equation of motion by up to 4e-3.
 _SOLVER_TOLERANCE = 1e-15
+
+Furnishing: TypeAlias = Callable[[Any, Any], None]
+"""What else there is in the model: takes the mujoco module and the `mujoco.MjSpec` with the robot in it, to add to."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,13 +66,20 @@ def load_mujoco() -> Any:
     return mujoco
 
 
-def build_plant(robot: Robot, *, parameters: TrueParameters | None = None, timestep: float = 5e-4) -> Plant:
+def build_plant(
+    robot: Robot,
+    *,
+    parameters: TrueParameters | None = None,
+    timestep: float = 5e-4,
+    furnish: Furnishing | None = None,
+) -> Plant:
     """Return the robot as a MuJoCo model.
 
     Parameters
     ----------
     parameters : inertia and friction; the robot's nominal ones by default
     timestep : of the integrator [s]
+    furnish : adds tools and workpieces; the link of joint k, from one, is the body `link_k`
 
     Raises
     ------
@@ -85,7 +96,10 @@ def build_plant(robot: Robot, *, parameters: TrueParameters | None = None, times
         )
     if not (np.isfinite(timestep) and timestep > 0.0):
         raise SimulationError("timestep", where=robot.name, expected="a positive time", got=timestep)
-    model = _compiled(mujoco, _specification(mujoco, robot, parameters, timestep), robot)
+    specification = _specification(mujoco, robot, parameters, timestep)
+    if furnish is not None:
+        furnish(mujoco, specification)
+    model = _compiled(mujoco, specification, robot)
     names = [_joint_name(index) for index in range(robot.n_v)]
     dof = np.array([int(model.joint(name).dofadr[0]) for name in names], dtype=np.intp)
     _set_drives(mujoco, model, dof, parameters)

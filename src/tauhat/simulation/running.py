@@ -179,9 +179,9 @@ def _refuse_stiff_laws(running: RunningPlant) -> None:
     Judged by the inertia of each joint with the others free. An elastic gear without a gap may be as stiff as it likes.
     """
     plant, n_v, drives = running.plant, running.plant.robot.n_v, running.machine.drives
-    inverse = np.empty((n_v, n_v))
     mujoco, model, data = running.simulator
-    mujoco.mj_solveM(model, data, inverse, np.eye(n_v))
+    inverse = np.empty((model.nv, model.nv))
+    mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
     link = np.diag(inverse)[plant.dof]
     elastic = drives.stiffness > 0.0
     motor = 1.0 / np.where(elastic, drives.rotor, np.inf)
