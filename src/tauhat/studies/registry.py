@@ -10,6 +10,7 @@ from tauhat.studies.crs_a465 import CrsA465Study
 from tauhat.studies.force_sensing import ForceSensingStudy
 from tauhat.studies.local_global import LocalGlobalStudy
 from tauhat.studies.monte_carlo import MonteCarloStudy
+from tauhat.studies.polishing import PolishingStudy
 from tauhat.studies.real_logs import RealLogsStudy
 from tauhat.studies.study import Study
 from tauhat.studies.whole_rehearsal import WholeRehearsalStudy
@@ -19,6 +20,7 @@ _KINDS: tuple[type[Study], ...] = (
     ForceSensingStudy,
     LocalGlobalStudy,
     MonteCarloStudy,
+    PolishingStudy,
     RealLogsStudy,
     WholeRehearsalStudy,
 )

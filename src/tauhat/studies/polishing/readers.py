@@ -1,0 +1,133 @@
+"""Where a polisher's force comes from: a load cell, the virtual sensor, or nothing at all."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tauhat.arrays import FloatArray
+from tauhat.control.force.reading import ForceReading
+from tauhat.sensing.sensor import ForceSensor
+from tauhat.sensing.wrench import WrenchSolver
+from tauhat.sensing.zero import AirPass
+from tauhat.simulation.contact.running_cell import CellSample
+
+
+class Place(NamedTuple):
+    """Where the tool is on its way.
+
+    along : direction of the feed along the tool's x: 1, -1, or 0 while it stands
+    progress : way of the tool since the passes began, there and back [m]
+    """
+
+    along: float
+    progress: float
+
+
+class ForceReader(ABC):
+    """Makes readings of samples; keeps nothing but the memory that it is handed."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def start(self) -> Any:
+        """Return the memory before the first sample."""
+
+    @abstractmethod
+    def read(self, memory: Any, sample: CellSample, place: Place) -> tuple[Any, ForceReading | None]:
+        """Return the memory behind a sample and the force along the outward normal."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoadCellReading(ForceReader):
+    """The load cell behind the tip, and its error [N]."""
+
+    std: float = 0.6
+
+    def start(self) -> None:
+        """Return nothing."""
+        return
+
+    def read(self, memory: None, sample: CellSample, place: Place) -> tuple[None, ForceReading | None]:  # noqa: ARG002
+        """Return what the load cell shows."""
+        return memory, ForceReading(sample.load_cell, self.std)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoReading(ForceReader):
+    """No force: the polisher runs open loop."""
+
+    def start(self) -> None:
+        """Return nothing."""
+        return
+
+    def read(self, memory: None, sample: CellSample, place: Place) -> tuple[None, ForceReading | None]:  # noqa: ARG002
+        """Return no reading."""
+        return memory, None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SensedReading(ForceReader):
+    """The virtual sensor: external torque of the joints, solved for the force along the tool's axis.
+
+    The frame of the wrench is the tip, whose z points into the workpiece and whose x is along the path: a force that
+    pushes the tool out is along -z, and friction is assumed to be against the feed.
+
+    sensor : of the external torque
+    solvers : of the force while the tool stands, moves along its x, and against it
+    normal : (6,) unit wrench whose part in the solved one is the normal force
+    zero : torque that the same way shows in air; None: nothing is taken off
+    """
+
+    sensor: ForceSensor
+    solvers: tuple[WrenchSolver, WrenchSolver, WrenchSolver]
+    zero: AirPass | None = None
+    normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
+
+    def start(self) -> FloatArray:
+        """Return the sensor's memory."""
+        return self.sensor.start()
+
+    def read(self, memory: FloatArray, sample: CellSample, place: Place) -> tuple[FloatArray, ForceReading | None]:
+        """Return the force along the tool's axis with its error; none while the sensor settles."""
+        memory, sensed = self.sensor.advance(memory, sample.q, sample.tau)
+        if not sensed.settled:
+            return memory, None
+        tau = sensed.tau
+        if self.zero is not None:
+            tau = tau - self.zero.torque_at(np.array([place.progress]))[0]
+        solver = self.solvers[round(place.along)]
+        found = solver.along(sensed.q[None], tau[None], sensed.variance[None], own=np.square(sensed.lag)[None])
+        force = float(self.normal @ found.wrench[0])
+        return memory, ForceReading(force, float(np.sqrt(self.normal @ found.covariance[0] @ self.normal)))
+
+
+def along_the_normal(sensor: ForceSensor, frame: str, *, friction: float) -> tuple[WrenchSolver, ...]:
+    """Return solvers for one force along the tool's axis with friction against the feed: standing, forth and back.
+
+    Parameters
+    ----------
+    friction : assumed, tangential over normal force
+    """
+    return tuple(_solver(sensor, frame, [[-way * friction, 0.0, -1.0, 0.0, 0.0, 0.0]]) for way in (0.0, 1.0, -1.0))
+
+
+def of_three_forces(sensor: ForceSensor, frame: str) -> tuple[WrenchSolver, ...]:
+    """Return solvers for a force in any direction, the same whichever way the tool moves."""
+    return (_solver(sensor, frame, np.eye(6)[:3]),) * 3
+
+
+def of_all_components(sensor: ForceSensor, frame: str) -> tuple[WrenchSolver, ...]:
+    """Return solvers for the whole wrench, the inverse Jacobian of a textbook, as far as joints tell it."""
+    return (_solver(sensor, frame, np.eye(6)),) * 3
+
+
+def _solver(sensor: ForceSensor, frame: str, directions: Any) -> WrenchSolver:
+    columns = np.array(directions, dtype=np.float64).T
+    return WrenchSolver(
+        robot=sensor.model.robot, frame=frame, directions=columns / np.linalg.norm(columns, axis=0), axes="frame",
+        correlation=sensor.solver.correlation,
+    )  # fmt: skip
