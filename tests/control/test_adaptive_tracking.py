@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sample_arms import PLANAR, planar_arm, random_tree, smooth_motion
-from tauhat.control import AdaptiveTracking, ControlSample, learning_along, tracking_regressor
-from tauhat.dynamics import base_parameters, inverse_dynamics, rotor_mass_matrix, torque_model
+from tauhat.control import AdaptiveTracking, ControlSample, learning_along, model_torque, tracking_regressor
+from tauhat.dynamics import TorqueModel, base_parameters, inverse_dynamics, rotor_mass_matrix, torque_model
 from tauhat.dynamics.forward import nominal_masses
-from tauhat.dynamics.terms import Coulomb
+from tauhat.dynamics.terms import Coulomb, CouplingDahl, GasSpring, Inertia, RotorInertia, Viscous
 from tauhat.errors import ArrayError, ModelError
 from tauhat.robots import pinocchio_model
 
@@ -82,6 +82,22 @@ def test_with_the_robots_own_motion_the_regressor_gives_its_torque(seed, n_v):
     torque = inverse_dynamics(robot, q[None], dq[None], ddq[None])[0]
     ours = columns @ (base.projection @ robot.inertia.ravel())
     np.testing.assert_allclose(ours, torque, atol=1e-7 * max(1.0, np.abs(torque).max()))
+
+
+def test_springs_and_shared_motors_are_columns_of_the_regressor_too():
+    spring = GasSpring(joint=1, distance=0.8, lever=0.2, angle=0.1, area=1e-3, volume=1e-3)
+    shared = CouplingDahl(motors=((1, 0, -1.7),), scales=(30.0,))
+    model = TorqueModel(robot=ARM, terms=(Inertia(), RotorInertia(), Viscous(), spring, shared))
+    base = base_parameters(model)
+    standard = np.random.default_rng(6).uniform(0.2, 1.0, model.n_p)
+    q, dq, ddq = smooth_motion(2, np.arange(0.0, 1.0, 0.01), seed=5)
+    regressor = tracking_regressor(model, base)
+    bent, found = np.zeros(regressor.elements.size), np.empty_like(q)
+    for k in range(len(q)):
+        bent = regressor.bent(bent, q[k] - q[max(0, k - 1)])
+        columns = regressor.columns((q[k], dq[k]), dq[k], ddq[k], bent=bent)
+        found[k] = columns @ (base.projection @ standard)
+    np.testing.assert_allclose(found, model_torque(model, standard).along(q, dq, ddq), atol=1e-9)
 
 
 def test_the_regressor_has_the_coriolis_matrix_of_the_textbooks():

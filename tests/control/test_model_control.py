@@ -20,8 +20,8 @@ from tauhat.control import (
     model_torque,
     nominal_torque,
 )
-from tauhat.dynamics import TorqueModel, torque_model
-from tauhat.dynamics.terms import Coupling, Dahl
+from tauhat.dynamics import TorqueModel, motion_from_rows, torque_model
+from tauhat.dynamics.terms import Coupling, CouplingDahl, Dahl, GasSpring, Inertia, RotorInertia, Thermal, Viscous
 from tauhat.errors import ArrayError, ModelError
 from tauhat.estimation import identify
 from tauhat.estimation.identified_torque import identified_torque
@@ -84,6 +84,21 @@ def test_an_identified_torque_along_a_motion_is_the_estimates_own_prediction():
     t = np.arange(0.0, 3.0, 0.005)
     motion = smooth_motion(2, t, seed=5)
     np.testing.assert_allclose(identified_torque(estimate).along(*motion), estimate.predict(*motion), atol=1e-9)
+
+
+@pytest.mark.parametrize("coupling", [Coupling, CouplingDahl])
+def test_torque_with_a_gas_spring_and_a_shared_motor_is_regressor_times_parameters(coupling):
+    spring = GasSpring(joint=1, distance=0.8, lever=0.2, angle=0.1, area=1e-3, volume=1e-3)
+    shape = {"widths": (0.3,)} if coupling is Coupling else {"scales": (30.0,)}
+    shared = coupling(motors=((1, 0, -1.7),), **shape)
+    model = TorqueModel(robot=ARM, terms=(Inertia(), RotorInertia(), Viscous(), spring, shared))
+    standard = np.random.default_rng(6).uniform(0.2, 1.0, model.n_p)
+    q, dq, ddq = smooth_motion(2, np.arange(0.0, 3.0, 0.01), seed=5)
+    columns, layout = model.columns(motion_from_rows(q, dq, ddq), model.layout())[0], model.layout()
+    rows = [layout.of_joint(joint) for joint in range(2)]
+    expected = np.array([standard[layout.parameters[part]] @ columns[part] for part in rows]).T
+    assert np.abs(expected).max() > 10.0
+    np.testing.assert_allclose(model_torque(model, standard).along(q, dq, ddq), expected, atol=1e-9)
 
 
 def test_pre_sliding_friction_builds_up_over_its_length_and_turns_round_as_dahl_says():
@@ -171,6 +186,8 @@ def test_what_does_not_fit_is_refused():
         computed_torque(torque, bandwidth=0.0)
     with pytest.raises(ModelError, match="elements of a model torque"):
         ModelTorque(robot=ARM, inertia=ARM.inertia, rotor=np.zeros(2), elements=np.zeros(3))
-    model = TorqueModel(robot=ARM, terms=(Coupling(motors=((1, 0, 1.0),)),))
-    with pytest.raises(ModelError, match="term coupling cannot be simulated"):
+    with pytest.raises(ArrayError, match="model torque: rotor inertia is not symmetric"):
+        ModelTorque(robot=ARM, inertia=ARM.inertia, rotor=np.array([[1.0, 0.1], [0.2, 1.0]]))
+    model = TorqueModel(robot=ARM, terms=(Thermal(),))
+    with pytest.raises(ModelError, match="term thermal cannot be simulated"):
         model_torque(model, np.zeros(model.n_p))

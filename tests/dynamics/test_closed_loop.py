@@ -13,6 +13,8 @@ from tauhat.dynamics import Coulomb, Motion, TorqueModel, Viscous, torque_model
 from tauhat.dynamics.simulated_arm import Followed, Gains, Stepping, follow, simulated_arm
 from tauhat.dynamics.terms import (
     Asymmetric,
+    Coupling,
+    CouplingDahl,
     CubeRoot,
     Dahl,
     GasSpring,
@@ -24,6 +26,7 @@ from tauhat.dynamics.terms import (
     RotorInertia,
     Spring,
     Stribeck,
+    Thermal,
     ViscousAsymmetry,
 )
 from tauhat.errors import ModelError, SimulationError
@@ -168,17 +171,21 @@ ELEMENTS = (
     Viscous(), Coulomb(widths=(0.3, 0.2)), CubeRoot(), ViscousAsymmetry(), Asymmetric(widths=(0.3, 0.2)),
     Stribeck(speeds=(0.5, 0.7)), PolynomialFriction(speeds=(0.5, 0.7)), Offset(), Spring(), Dahl(scales=(300.0, 200.0)),
     RotorInertia(), LoadCoulomb(widths=(0.3, 0.2)), LoadDahl(), Coulomb(widths=(0.3, 0.2), joints=(False, True)),
+    GasSpring(joint=1, distance=0.8, lever=0.2, angle=0.1, area=0.005, volume=0.01),
+    Coupling(motors=((1, 0, -0.7),), widths=(0.3,)), CouplingDahl(motors=((1, 0, 1.3),), scales=(300.0,)),
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("term", ELEMENTS, ids=[f"{term.key}{sum(term.joints) or ''}" for term in ELEMENTS])
+@pytest.mark.parametrize("term", ELEMENTS, ids=lambda term: f"{term.key}{sum(getattr(term, 'joints', ())) or ''}")
 @settings(max_examples=10)
 @given(seed=st.integers(0, 1000))
 def test_the_torque_a_term_takes_is_that_of_its_columns(term, seed):
     robot = planar_arm()
     model = TorqueModel(robot=robot, terms=(Inertia(), term))
     rng = np.random.default_rng(seed)
-    own = 0.3 * rng.uniform(0.5, 1.0, len(term.parameters(robot)))
+    # Of a shared motor's inertia and viscous friction only the part between the joints is here: little, or no body.
+    size = 0.01 if isinstance(term, Coupling) else 0.3
+    own = size * rng.uniform(0.5, 1.0, len(term.parameters(robot)))
     standard = np.concatenate([robot.inertia.ravel(), own])
     t = np.arange(0.0, 0.3, 1e-3)
     q, dq = sines(t, 2)
@@ -197,10 +204,48 @@ def test_the_torque_a_term_takes_is_that_of_its_columns(term, seed):
 
 
 def test_a_term_without_forward_dynamics_is_refused_by_name():
-    spring = GasSpring(joint=0, distance=0.8, lever=0.2, angle=0.1, area=0.005, volume=0.01)
-    model = TorqueModel(robot=planar_arm(), terms=(Inertia(), spring))
-    with pytest.raises(ModelError, match=r"term gas-spring cannot be simulated; expected inertia, rotor, viscous"):
+    model = TorqueModel(robot=planar_arm(), terms=(Inertia(), Thermal()))
+    with pytest.raises(ModelError, match=r"term thermal cannot be simulated; expected inertia, rotor, coupling"):
         simulated_arm(model)
+
+
+@pytest.mark.parametrize(
+    "term", [Coupling(motors=((1, 0, 1.0),), widths=(0.1, 0.1)), CouplingDahl(motors=((1, 0, 1.0),), scales=(1.0, 2.0))]
+)
+def test_a_shared_motor_with_the_shapes_of_two_is_refused(term):
+    with pytest.raises(ModelError, match="shapes; expected 1 values, got 2"):
+        simulated_arm(TorqueModel(robot=planar_arm(), terms=(Inertia(), term)))
+
+
+def wrist(term, *, substeps=1, method="leapfrog"):
+    """Return the planar arm on the way of its law, its second motor turning with the first joint too."""
+    model = TorqueModel(robot=planar_arm(), terms=(Inertia(), RotorInertia(), Viscous(), term))
+    dry = [2.0] if isinstance(term, CouplingDahl) else []
+    standard = np.concatenate([planar_arm().inertia.ravel(), [0.3, 0.3, 0.9, 0.5, 0.2, 0.4, 2.0], dry])
+    t = np.arange(0.0, 2.0, 1e-3)
+    q, dq = sines(t, 2)
+    return follow(
+        simulated_arm(model), standard, Followed(q, dq, np.zeros_like(q)), gains=gains(300.0, 20.0, n_v=2),
+        start=np.array([q[0], dq[0]]), stepping=Stepping(1e-3, substeps, 0, method),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "term", [Coupling(motors=((1, 0, -1.5),), widths=(0.5,)), CouplingDahl(motors=((1, 0, -1.5),), scales=(300.0,))]
+)
+def test_leapfrog_is_of_second_order_with_a_shared_motor_too(term):
+    fine = wrist(term, method="runge-kutta", substeps=32).q
+    errors = [np.abs(wrist(term, substeps=n).q - fine).max() for n in (4, 8)]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    "term", [Coupling(motors=((1, 0, -1.5),), widths=(1e-4,)), CouplingDahl(motors=((1, 0, -1.5),), scales=(1.0,))]
+)
+def test_sharp_friction_of_a_shared_motor_neither_overshoots_nor_changes_with_the_step(term):
+    coarse, fine = (wrist(term, substeps=n) for n in (1, 20))
+    assert np.sqrt(np.mean((coarse.tau - fine.tau) ** 2)) < 5e-3 * np.sqrt(np.mean(fine.tau**2))
+    assert np.abs(coarse.q - fine.q).max() < 2e-4
 
 
 def test_the_arm_moves_as_mujocos_does():

@@ -17,7 +17,7 @@ from tauhat.robots.library import builtin_names
 
 def momentum(robot, inertia, q, dq, rotor=None):
     out = np.empty((len(q), 2, robot.n_v))
-    rotors = np.zeros(robot.n_v) if rotor is None else rotor
+    rotors = np.zeros((robot.n_v, robot.n_v)) if rotor is None else rotor
     body, work = (kernel_tree(robot).links, inertia, rotors), np.empty(40 * robot.n_v)
     for k in range(len(q)):
         momentum_kernel(body, q[k], dq[k], work, out[k])
@@ -68,10 +68,11 @@ def test_base_parameters_have_the_momentum_of_the_whole_arm_and_rotors_add_their
     base = base_parameters(model)
     regrouped = np.zeros(model.n_p)
     regrouped[base.independent] = base.projection @ robot.inertia.ravel()
-    q, dq, rotor = *rng.uniform(-2.0, 2.0, (2, 10, 6)), rng.uniform(0.1, 1.0, 6)
+    q, dq, root = *rng.uniform(-2.0, 2.0, (2, 10, 6)), rng.uniform(0.1, 1.0, (6, 6))
+    rotor = root @ root.T
     p, drift = momentum(robot, np.array(robot.inertia), q, dq)
     p_base, drift_base = momentum(robot, regrouped.reshape(-1, 10), q, dq, rotor)
-    assert p_base - rotor * dq == pytest.approx(p, abs=1e-9)
+    assert p_base - dq @ rotor == pytest.approx(p, abs=1e-9)
     assert drift_base == pytest.approx(drift, abs=1e-9)
 
 

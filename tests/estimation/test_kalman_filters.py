@@ -18,8 +18,9 @@ from filter_problems import (
     truth,
 )
 
-from sample_arms import motion_from_rest
-from tauhat.dynamics import base_parameters, torque_model
+from sample_arms import Truth, chain, motion_from_rest
+from tauhat.dynamics import TorqueModel, base_parameters, torque_model
+from tauhat.dynamics.terms import Coupling, Inertia, RotorInertia, Viscous
 from tauhat.errors import ModelError, TauhatWarning
 from tauhat.estimation import OrdinaryLeastSquares, WeightedLeastSquares
 from tauhat.estimation.filters import (
@@ -176,6 +177,19 @@ def test_accelerations_undo_the_torque_of_the_truth():
     model = truth().model
     forward = point_accelerations(model, base_parameters(model))
     found = forward.at(q, dq, truth().torque(q, dq, ddq), np.tile(true_values(), (q.shape[0], 1)))
+    assert np.allclose(found, ddq, atol=1e-9)
+
+
+def test_accelerations_undo_the_torque_of_an_arm_whose_motor_turns_with_two_joints():
+    arm = chain(np.random.default_rng(7), "RRR")
+    shared = Coupling(motors=((2, 1, -1.5),), widths=(0.2,))
+    model = TorqueModel(robot=arm, terms=(Inertia(), RotorInertia(), Viscous(), shared))
+    standard = np.concatenate([arm.inertia.ravel(), np.full(3, 0.8), np.full(3, 2.0), [0.2, 0.7, 1.1]])
+    base = base_parameters(model)
+    q, dq, ddq = motion_from_rest(3, np.arange(0.0, 4.0, 0.02), seed=4)
+    torque = Truth(model, standard).torque(q, dq, ddq)
+    found = point_accelerations(model, base).at(q, dq, torque, np.tile(base.projection @ standard, (q.shape[0], 1)))
+    assert "Iam_3" in {base.names[index] for index in base.independent}
     assert np.allclose(found, ddq, atol=1e-9)
 
 

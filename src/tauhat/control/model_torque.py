@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, frozen, read_only
 from tauhat.control.model_torque_kernel import model_torque_kernel
+from tauhat.dynamics.forward import rotor_matrix
 from tauhat.dynamics.model import TorqueModel, torque_model
 from tauhat.dynamics.nominal import nominal_standard_parameters
 from tauhat.dynamics.passive_kernel import ELEMENT
@@ -44,7 +45,7 @@ class ModelTorque:
 
     robot : geometry and gravity
     inertia : (n_v, 10) standard parameters; base parameters do as well, the regrouped ones zero
-    rotor : (n_v,) rotor inertia, joint side [kg m^2 or kg]
+    rotor : (n_v, n_v) rotor inertia, joint side [kg m^2 or kg]; (n_v,) where each motor turns with one joint
     elements : (n_elements,) friction, springs and offsets, as `dynamics.passive_kernel` reads them
     """
 
@@ -57,7 +58,7 @@ class ModelTorque:
     def __post_init__(self) -> None:
         n_v = self.robot.n_v
         object.__setattr__(self, "inertia", frozen("inertia", self.inertia, (n_v, 10), where="model torque"))
-        object.__setattr__(self, "rotor", frozen("rotor", self.rotor, (n_v,), where="model torque"))
+        object.__setattr__(self, "rotor", rotor_matrix(self.rotor, n_v, where="model torque"))
         elements = np.array(self.elements)
         if elements.dtype != ELEMENT:
             raise ModelError("elements of a model torque", expected="those of simulated_arm", got=elements.dtype)
@@ -110,7 +111,7 @@ def model_torque(model: TorqueModel, standard: FloatArray) -> ModelTorque:
     Raises
     ------
     ModelError
-        when a term has no value at a single state here: gas springs and motors that turn with two joints.
+        when a term has no value at a single state: friction that warms up.
     """
     arm = simulated_arm(model)
     values = frozen("standard", standard, (model.n_p,), where="model torque")

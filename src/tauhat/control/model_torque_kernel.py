@@ -4,8 +4,8 @@ Rigid links and rotors are at the state (q, v, a); friction, springs and offsets
 one: that of a reference, where measured speeds are too noisy for a sign. The load that friction may grow with is
 `|M a + b|`. Bristles bend by the displacement since the step before, exactly, whatever its size (`passive_kernel`).
 
-Arguments in tuples: `body` are links, inertia (n_v, 10), rotor (n_v,), elements of `passive_kernel`; `state` q, v, a;
-`passing` q_p, v_p and the displacement, (n_v,) each. Changed: `bent` (n_elements,). Filled: `out` (n_v,).
+Arguments in tuples: `body` are links, inertia (n_v, 10), rotor (n_v, n_v), elements of `passive_kernel`; `state` q, v,
+a; `passing` q_p, v_p and the displacement, (n_v,) each. Changed: `bent` (n_elements,). Filled: `out` (n_v,).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from tauhat.dynamics.forward_kernel import bias_and_mass, sweep_outward
-from tauhat.dynamics.passive_kernel import DAHL, LOAD_DAHL, bent_by, passive_kernel
+from tauhat.dynamics.passive_kernel import DAHL, LOAD_DAHL, bent_by, passive_kernel, turned_by
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
@@ -32,7 +32,8 @@ def model_torque_kernel(body, state, passing, bent, out):  # type: ignore[no-unt
         for j in range(n_v):
             out[i] += mass[i, j] * a[j]
         load[i] = abs(out[i])
-        out[i] += rotor[i] * a[i]
+        for j in range(n_v):
+            out[i] += rotor[i, j] * a[j]
     bend_kernel(elements, passing[2], bent)
     passive_kernel(elements, passing[0], passing[1], load, bent, passive)
     for i in range(n_v):
@@ -44,4 +45,14 @@ def bend_kernel(elements, moved, bent):  # type: ignore[no-untyped-def]
     """Change the states of the bristles, `bent` (n_elements,), by a displacement of the joints `moved` (n_v,)."""
     for k in range(elements.size):
         if elements[k].kind == DAHL or elements[k].kind == LOAD_DAHL:
-            bent[k] = bent_by(moved[elements[k].joint], elements[k].shape, bent[k])
+            bent[k] = bent_by(turned_by(elements[k], moved), elements[k].shape, bent[k])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def element_columns_kernel(elements, state, bent, out):  # type: ignore[no-untyped-def]
+    """Fill `out` (n_elements, n_v) with the torque of each element alone at `state` q, v (n_v,), under no load."""
+    q, v = state
+    taken, load = np.empty((3, q.size)), np.zeros(q.size)
+    for k in range(elements.size):
+        passive_kernel(elements[k : k + 1], q, v, load, bent[k : k + 1], taken)
+        out[k] = taken[0]

@@ -20,10 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, IntArray, read_only
-from tauhat.control.model_torque_kernel import bend_kernel
+from tauhat.control.model_torque_kernel import bend_kernel, element_columns_kernel
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
-from tauhat.dynamics.passive_kernel import passive_kernel
 from tauhat.dynamics.regressor_kernel import regressor_kernel
 from tauhat.dynamics.simulated_arm import simulated_arm
 from tauhat.dynamics.tree import kernel_tree
@@ -40,9 +39,10 @@ class TrackingRegressor:
     robot : geometry and gravity
     n_b : number of base parameters
     bodies : (n_i, 2) column, row among the 10 n_v of the links
-    rotors : (n_r, 2) column, joint
-    passive : (n_e, 2) column, joint of the elements of friction, springs and offsets
-    elements : (n_e,) each on a joint of its own and of unit weight: their torques are their columns
+    rotors : (n_r, 3) column, row and column of the rotor inertia
+    shares : (n_r,) of the parameter there
+    passive : (n_e,) column of the elements of friction, springs and offsets
+    elements : (n_e,) of unit weight
     links : of the kernel tree
     """
 
@@ -50,6 +50,7 @@ class TrackingRegressor:
     n_b: int
     bodies: IntArray
     rotors: IntArray
+    shares: FloatArray
     passive: IntArray
     elements: NDArray[np.void]
     links: NDArray[np.void]
@@ -57,7 +58,7 @@ class TrackingRegressor:
     def bent(self, before: FloatArray, moved: FloatArray) -> FloatArray:
         """Return the states of the bristles (n_e,) behind a displacement of the joints (n_v,) [rad or m]."""
         after = before.copy()
-        bend_kernel(self.elements, moved[self.passive[:, 1]], after)
+        bend_kernel(self.elements, moved, after)
         return after
 
     def columns(
@@ -81,11 +82,10 @@ class TrackingRegressor:
         regressor_kernel(self.links, places, speeds, accelerations, whole)
         rows = np.zeros((self.n_b, n_v))
         rows[self.bodies[:, 0]] = whole[self.bodies[:, 1]] @ _PARTS
-        rows[self.rotors[:, 0], self.rotors[:, 1]] = dv[self.rotors[:, 1]]
-        joints = self.passive[:, 1]
-        taken = np.empty((3, joints.size))
-        passive_kernel(self.elements, q[joints], v[joints], np.zeros(joints.size), bent, taken)
-        rows[self.passive[:, 0], joints] = taken[0]
+        np.add.at(rows, (self.rotors[:, 0], self.rotors[:, 1]), self.shares * dv[self.rotors[:, 2]])
+        taken = np.empty((self.passive.size, n_v))
+        element_columns_kernel(self.elements, (q, v), bent, taken)
+        rows[self.passive] = taken
         return rows.T
 
 
@@ -108,16 +108,18 @@ def tracking_regressor(model: TorqueModel, base: BaseParameters) -> TrackingRegr
     arm = simulated_arm(model)
     place = np.full(model.n_p, -1)
     place[base.independent] = np.arange(base.n_b)
-    kept = place[arm.elements[:, 0]] >= 0
-    elements = arm.passive(np.ones(model.n_p))[kept]
-    elements["joint"] = np.arange(elements.size)
+    kept = place[arm.parameters] >= 0
+    driven = place[arm.rotors[:, 0]] >= 0
+    rotors = arm.rotors[driven].copy()
+    rotors[:, 0] = place[rotors[:, 0]]
     return TrackingRegressor(
         robot=model.robot,
         n_b=base.n_b,
         bodies=_placed(place, arm.bodies[:, 0], 10 * arm.bodies[:, 1] + arm.bodies[:, 2]),
-        rotors=_placed(place, arm.rotors[:, 0], arm.rotors[:, 1]),
-        passive=_placed(place, arm.elements[:, 0], arm.elements[:, 2]),
-        elements=read_only(elements),
+        rotors=read_only(rotors),
+        shares=read_only(arm.shares[driven]),
+        passive=read_only(place[arm.parameters[kept]]),
+        elements=read_only(arm.elements[kept]),
         links=kernel_tree(model.robot).links,
     )
 

@@ -6,14 +6,14 @@ Two integrators of the same equations `M(q) ddq = tau - bias(q, dq) - passive(q,
 solves for the change of speed d, implicitly in what is stiff; second order where the forces are smooth:
     (M + h/2 (kd + c) + h^2/4 (kp + k)) d = h (tau(q, v) - bias(q, v) - passive(q, v) + (kd + c) (v - u))
     dq = u + d/2     ddq = d/h     u+ = u + d     q+ = q + h u+
-c and k are the secant damping and the bristles' stiffness of `passive_kernel`: however sharp friction is, it neither
-overshoots nor diverges. A joint whose torque is held or at its limit takes no part of kp and kd.
+c and k are the secant damping and the bristles' stiffness of `passive_kernel`, matrices where a motor turns with two
+joints: however sharp friction is, it neither overshoots nor diverges. A joint whose torque is held or at its limit takes no part of kp and kd.
 Where a held torque changes, the step around that time takes the mean of both.
 
 `runge_kutta_kernel` is the classical method of fourth order, explicit: for smooth friction, and to check the other.
 
 Arguments in tuples:
-    arm    links of `KernelTree`, inertia (n_v, 10), rotor (n_v,), elements of `passive_kernel`
+    arm    links of `KernelTree`, inertia (n_v, 10), rotor (n_v, n_v), elements of `passive_kernel`
     task   law: kp, kd, ki, limit (n_v,); reference: q, dq, ff (n_t, n_v), on cubics between the samples; times: the
            step between samples, the steps of the integrator in it, and for how many of these the controller holds a
            torque, as sampled controllers do (0: it acts all the time), and how many of its periods a torque is late
@@ -29,7 +29,7 @@ import numpy as np
 from numba import njit
 
 from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved, sweep_outward
-from tauhat.dynamics.passive_kernel import DAHL, LOAD_DAHL, bent_by, passive_kernel
+from tauhat.dynamics.passive_kernel import DAHL, LOAD_DAHL, bent_by, coupled_by, passive_kernel, turned_by
 
 FINE, NO_BODY, RAN_AWAY = 0, 1, 2
 _LATE = 16  # row of memory from which on torques stand that have been asked for and not come through yet
@@ -87,6 +87,7 @@ def _leap(turn, s, arm, task, memory):  # type: ignore[no-untyped-def]
         keep[j] = free[j] * law[1][j] + damping[j]
         mass[j, j] += 0.5 * h * keep[j] + 0.25 * h * h * (free[j] * law[0][j] + stiffness[j])
         d[j] = h * (tau[j] - bias[j] - taken[j] + keep[j] * (v[j] - u[j]))
+    _couple(arm[3], h, rows, bent, mass)
     failed = factorised(mass)
     if failed >= 0:
         return NO_BODY, failed
@@ -94,6 +95,20 @@ def _leap(turn, s, arm, task, memory):  # type: ignore[no-untyped-def]
     for j in range(q.size):
         a[j] = d[j] / h
     return FINE, -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _couple(elements, h, rows, bent, mass):  # type: ignore[no-untyped-def]
+    """Add what is implicit between the two joints of a shared motor to the mass matrix and the right-hand side."""
+    u, v, d = rows[1], rows[2], rows[4]
+    for k in range(elements.size):
+        if elements[k].ratio == 0.0:
+            continue
+        i, j = elements[k].joint, elements[k].other
+        damping, stiffness = coupled_by(elements[k], v, bent[k])
+        for row, column in ((i, j), (j, i)):
+            mass[row, column] += 0.5 * h * damping + 0.25 * h * h * stiffness
+            d[row] += h * damping * (v[column] - u[column])
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
@@ -304,11 +319,12 @@ def _mass_and_load(arm, motion, work, torques, mass):  # type: ignore[no-untyped
             torque += mass[i, j] * a[j]
         load[i] = abs(torque)
     for i in range(q.size):
-        mass[i, i] += rotor[i]
+        for j in range(q.size):
+            mass[i, j] += rotor[i, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def _bend(elements, moved, bent):  # type: ignore[no-untyped-def]
     for k in range(elements.size):
         if elements[k].kind == DAHL or elements[k].kind == LOAD_DAHL:
-            bent[k] = bent_by(moved[elements[k].joint], elements[k].shape, bent[k])
+            bent[k] = bent_by(turned_by(elements[k], moved), elements[k].shape, bent[k])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tauhat.arrays import FloatArray, frozen
+from tauhat.arrays import FloatArray, frozen, read_only
 from tauhat.dynamics.forward_kernel import forward_kernel, mass_kernel
 from tauhat.dynamics.tree import kernel_tree
 from tauhat.errors import ArrayError, ModelError
@@ -20,7 +20,7 @@ class Masses(NamedTuple):
     """What makes a robot's mass matrix.
 
     inertia : (n_v, 10) standard parameters; base parameters do as well, the regrouped ones zero
-    rotor : (n_v,) rotor inertia, joint side [kg m^2 or kg]
+    rotor : (n_v,) rotor inertia, joint side, or (n_v, n_v) where motors turn with two joints [kg m^2 or kg]
     """
 
     inertia: FloatArray
@@ -84,7 +84,7 @@ def forward_dynamics(
 
 
 def rotor_mass_matrix(robot: Robot, q: FloatArray, *, masses: Masses | None = None) -> FloatArray:
-    """Return the mass matrices with the rotors on their diagonal, (n_t, n_v, n_v) [kg m^2 or kg].
+    """Return the mass matrices with the rotors in them, (n_t, n_v, n_v) [kg m^2 or kg].
 
     Parameters
     ----------
@@ -95,6 +95,22 @@ def rotor_mass_matrix(robot: Robot, q: FloatArray, *, masses: Masses | None = No
     out = np.empty((positions.shape[0], robot.n_v, robot.n_v))
     mass_kernel(_kernel_body(robot, masses), positions, out)
     return out
+
+
+def rotor_matrix(rotor: FloatArray, n_v: int, *, where: str = "") -> FloatArray:
+    """Return rotor inertia as it stands in the mass matrix, (n_v, n_v); one value a joint, (n_v,), is its diagonal.
+
+    Raises
+    ------
+    ArrayError
+        when it is neither, not finite, or not symmetric.
+    """
+    if np.ndim(rotor) < 2:
+        return np.asarray(read_only(np.diag(frozen("rotor", rotor, (n_v,), where=where))))
+    matrix = frozen("rotor", rotor, (n_v, n_v), where=where)
+    if not np.array_equal(matrix, matrix.T):
+        raise ArrayError("rotor inertia is not symmetric", where=where, got=matrix.tolist())
+    return matrix
 
 
 def not_a_body(robot: Robot, joint: int, where: str) -> ModelError:
@@ -112,5 +128,5 @@ def _kernel_body(robot: Robot, masses: Masses | None = None) -> tuple[NDArray[np
     return (
         kernel_tree(robot).links,
         frozen("inertia", inertia, (robot.n_v, 10)),
-        frozen("rotor", rotor, (robot.n_v,)),
+        rotor_matrix(rotor, robot.n_v),
     )

@@ -5,11 +5,11 @@ Mass matrix M: bodies are merged from the tips inward, about each link's own ori
     m_p += m        h_p += R h + m P        I_p += R I R' + 2 (P.Rh) E - P (Rh)' - (Rh) P' + m (P.P E - P P')
 and column i is the force of a unit acceleration of joint i on the merged body i, handed inward:
     revolute  f = e x h, n = I e        prismatic  f = m e, n = h x e        M_ij = e_j.n_j or e_j.f_j
-Rotor inertia and whatever an integrator treats implicitly are added to the diagonal. M = L L' exists only when M is
+Rotor inertia, a matrix where a motor turns with two joints, and what an integrator treats implicitly are added. M = L L' exists only when M is
 positive definite; the index of the first joint whose pivot is not positive is returned, -1 when all are.
 
 All of it is linear in (m, h, I): links without mass of their own, as base parameters leave them, are no exception.
-`body` is the links of `KernelTree`, inertia (n_v, 10), rotor (n_v,). `work` is scratch, 40 numbers a link, link i from `o = 40 i` on, its parent from p on: 0-8 R, 9-11 P, 12-14 w, 15-17 dw, 18-20 a, 21-23 f, 24-26 n, 27 m, 28-30 h, 31-36 I.
+`body` is the links of `KernelTree`, inertia (n_v, 10), rotor (n_v, n_v). `work` is scratch, 40 numbers a link, link i from `o = 40 i` on, its parent from p on: 0-8 R, 9-11 P, 12-14 w, 15-17 dw, 18-20 a, 21-23 f, 24-26 n, 27 m, 28-30 h, 31-36 I.
 
 Source: Featherstone, "Rigid body dynamics algorithms", 2008, ch. 6 (composite rigid body algorithm).
 """
@@ -33,7 +33,8 @@ def forward_kernel(body, states, out):  # type: ignore[no-untyped-def]
         sweep_outward(links, inertia, q[k], dq[k], work)
         bias_and_mass(links, work, bias, mass)
         for i in range(n_v):
-            mass[i, i] += rotor[i]
+            for j in range(n_v):
+                mass[i, j] += rotor[i, j]
             out[k, i] = tau[k, i] - bias[i]
         failed = factorised(mass)
         if failed >= 0:
@@ -52,7 +53,8 @@ def mass_kernel(body, q, out):  # type: ignore[no-untyped-def]
         sweep_outward(links, inertia, q[k], rest, work)
         bias_and_mass(links, work, bias, out[k])
         for i in range(n_v):
-            out[k, i, i] += rotor[i]
+            for j in range(n_v):
+                out[k, i, j] += rotor[i, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})

@@ -26,9 +26,9 @@ from tauhat.dynamics.forward_kernel import place_link
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def momentum_kernel(body, q, dq, work, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (2, n_v) with momentum and drift at `q`, `dq` (n_v,); `body` is links, inertia (n_v, 10), rotor (n_v,).
+    """Fill `out` (2, n_v) with momentum and drift at `q`, `dq` (n_v,); `body` is links, inertia (n_v, 10), rotor (n_v, n_v).
 
-    What a rotor keeps, `Ia dq`, is part of the momentum; it drifts by nothing.
+    What rotors keep, `Ia dq`, is part of the momentum; it drifts by nothing.
     """
     links, inertia, rotor = body
     n_v = q.size
@@ -38,7 +38,8 @@ def momentum_kernel(body, q, dq, work, out):  # type: ignore[no-untyped-def]
         _momentum(i, inertia, work, 40 * i)
     for i in range(n_v - 1, -1, -1):
         _read(links[i], work, 40 * i, i, out)
-        out[0, i] += rotor[i] * dq[i]
+        for j in range(n_v):
+            out[0, i] += rotor[i, j] * dq[j]
         if links[i].parent >= 0:
             _merged(work, 40 * i, 40 * links[i].parent)
 

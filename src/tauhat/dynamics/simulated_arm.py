@@ -18,11 +18,15 @@ from tauhat.dynamics.terms import (
     INERTIAL_SYMBOLS,
     Asymmetric,
     Coulomb,
+    Coupling,
+    CouplingDahl,
     CubeRoot,
     Dahl,
+    GasSpring,
     LoadCoulomb,
     LoadDahl,
     Offset,
+    Parameter,
     PolynomialFriction,
     ShapedTerm,
     Spring,
@@ -38,6 +42,8 @@ from tauhat.errors import ModelError, SimulationError
 Integrator: TypeAlias = Literal["leapfrog", "runge-kutta"]
 _KERNELS = {"leapfrog": leapfrog_kernel, "runge-kutta": runge_kutta_kernel}
 _ROTOR = "Ia"
+_DRY = 2  # parameters of a shared motor before those of dry friction
+_COUPLED = (Coupling.key, CouplingDahl.key)
 _SHARPEST = 1e-3  # [rad/s or m/s] width of a sign that the model takes as plain: none can be integrated
 _TYPICAL_SPEED = 0.05  # [rad/s or m/s] the speed of a Stribeck curve before any is chosen
 
@@ -54,6 +60,7 @@ _ELEMENTS: Mapping[type[Term], tuple[int, ...]] = {
     LoadDahl: (element.LOAD_DAHL,),
     Offset: (element.OFFSET,),
     Spring: (element.SPRING,),
+    GasSpring: (element.GAS,),
 }
 
 
@@ -106,30 +113,31 @@ class SimulatedArm:
 
     model : the terms
     bodies : (n_i, 3) parameter, link, place among the ten of a link
-    rotors : (n_r, 2) parameter, joint
-    elements : (n_e, 3) parameter, kind, joint of the passive elements
-    shapes : (n_e,) of the elements
+    rotors : (n_r, 3) parameter, row and column of the rotor inertia
+    shares : (n_r,) of the parameter there
+    parameters : (n_e,) of the passive elements
+    elements : (n_e,) with a weight of one
     """
 
     model: TorqueModel
     bodies: IntArray
     rotors: IntArray
-    elements: IntArray
-    shapes: FloatArray
+    shares: FloatArray
+    parameters: IntArray
+    elements: NDArray[np.void]
 
     def masses(self, standard: FloatArray) -> Masses:
-        """Return inertias and rotors of standard parameters (n_p,)."""
+        """Return inertias and rotors, (n_v, n_v), of standard parameters (n_p,)."""
         n_v = self.model.robot.n_v
-        inertia, rotor = np.zeros((n_v, 10)), np.zeros(n_v)
+        inertia, rotor = np.zeros((n_v, 10)), np.zeros((n_v, n_v))
         np.add.at(inertia, (self.bodies[:, 1], self.bodies[:, 2]), standard[self.bodies[:, 0]])
-        np.add.at(rotor, self.rotors[:, 1], standard[self.rotors[:, 0]])
+        np.add.at(rotor, (self.rotors[:, 1], self.rotors[:, 2]), self.shares * standard[self.rotors[:, 0]])
         return Masses(inertia, rotor)
 
     def passive(self, standard: FloatArray) -> NDArray[np.void]:
         """Return the passive elements as their kernel reads them."""
-        passive = np.empty(self.shapes.size, dtype=element.ELEMENT)
-        passive["kind"], passive["joint"] = self.elements[:, 1], self.elements[:, 2]
-        passive["shape"], passive["weight"] = self.shapes, standard[self.elements[:, 0]]
+        passive = self.elements.copy()
+        passive["weight"] = standard[self.parameters]
         return passive
 
 
@@ -141,36 +149,99 @@ def simulated_arm(model: TorqueModel) -> SimulatedArm:
     ModelError
         when a term has no forward dynamics here, naming it.
     """
-    bodies, rotors, elements, shapes = [], [], [], []
-    first, n_v = 0, model.robot.n_v
-    for term in model.terms:
-        parameters = term.parameters(model.robot)
-        for place, parameter in enumerate(parameters):
-            index, joint, symbol = first + place, parameter.joint, parameter.symbol
-            if symbol in INERTIAL_SYMBOLS:
-                bodies.append((index, joint, INERTIAL_SYMBOLS.index(symbol)))
-                continue
-            if symbol == _ROTOR:
-                rotors.append((index, joint))
-                continue
-            kinds = _kinds(term)
-            elements.append((index, kinds[place % len(kinds)], joint))
-            shapes.append(_shape(term, joint, place % len(kinds), n_v))
-        first += len(parameters)
+    driven = rotor_entries(model)
+    of_rotors = {entry.parameter for entry in driven}
+    bodies, places, elements = [], [], []
+    for index, (term, place, parameter) in enumerate(_owned(model)):
+        joint, symbol = parameter.joint, parameter.symbol
+        if symbol in INERTIAL_SYMBOLS:
+            bodies.append((index, joint, INERTIAL_SYMBOLS.index(symbol)))
+        elif index not in of_rotors:
+            places.append(index)
+            elements.append(_element(term, place, joint, model.robot.n_v))
     return SimulatedArm(
         model=model,
         bodies=read_only(np.array(bodies, dtype=np.intp).reshape(-1, 3)),
-        rotors=read_only(np.array(rotors, dtype=np.intp).reshape(-1, 2)),
-        elements=read_only(np.array(elements, dtype=np.intp).reshape(-1, 3)),
-        shapes=read_only(np.array(shapes, dtype=np.float64)),
+        rotors=read_only(np.array([entry[:3] for entry in driven], dtype=np.intp).reshape(-1, 3)),
+        shares=read_only(np.array([entry.share for entry in driven], dtype=np.float64)),
+        parameters=read_only(np.array(places, dtype=np.intp)),
+        elements=read_only(np.array(elements, dtype=element.ELEMENT)),
     )
+
+
+class RotorEntry(NamedTuple):
+    """Where a parameter stands in the matrix of rotor inertia, and how often."""
+
+    parameter: int
+    row: int
+    column: int
+    share: float
+
+
+def rotor_entries(model: TorqueModel) -> tuple[RotorEntry, ...]:
+    """Return the entries of the rotor inertia: one on the diagonal for each rotor, two beside it for a shared motor."""
+    entries = []
+    for index, (term, place, parameter) in enumerate(_owned(model)):
+        if parameter.symbol == _ROTOR:
+            entries.append(RotorEntry(index, parameter.joint, parameter.joint, 1.0))
+        elif isinstance(term, Coupling) and place % _per_motor(term) == 0:
+            own, other, ratio = term.motors[place // _per_motor(term)]
+            entries += [RotorEntry(index, own, other, ratio), RotorEntry(index, other, own, ratio)]
+    return tuple(entries)
+
+
+def _owned(model: TorqueModel) -> list[tuple[Term, int, Parameter]]:
+    """Return each parameter of the model with its term and its place there."""
+    return [(term, *one) for term in model.terms for one in enumerate(term.parameters(model.robot))]
+
+
+def _element(term: Term, place: int, joint: int, n_v: int) -> NDArray[np.void]:
+    """Return the element of a term's parameter, with a weight of one."""
+    made = np.zeros((), dtype=element.ELEMENT)
+    made["weight"] = 1.0
+    if isinstance(term, Coupling):
+        _share(made, term, place)
+        return made
+    kinds = _kinds(term)
+    made["kind"], made["joint"] = kinds[place % len(kinds)], joint
+    made["shape"] = _shape(term, joint, place % len(kinds), n_v)
+    if isinstance(term, GasSpring):
+        d, k = term.distance, term.lever
+        made["cylinder"] = d**2 + k**2, d * k, term.volume / term.area + d - k, term.angle
+    return made
+
+
+def _share(made: NDArray[np.void], term: Coupling, place: int) -> None:
+    """Fill the element of a shared motor's friction."""
+    number, own = divmod(place, _per_motor(term))
+    motor = term.motors[number]
+    made["joint"], made["other"], made["ratio"] = motor.own, motor.other, motor.ratio
+    made["shape"] = 1.0
+    if own == 1:
+        made["kind"] = element.COUPLING
+    elif isinstance(term, CouplingDahl):
+        scale = _of_motor(term, number, term.scales, 1.0)
+        made["kind"], made["shape"] = element.DAHL, scale * LENGTHS[own - _DRY]
+    else:
+        made["kind"], made["shape"] = element.SIGN, _of_motor(term, number, term.widths, _SHARPEST)
+
+
+def _of_motor(term: Coupling, number: int, shapes: tuple[float, ...], typical: float) -> float:
+    if shapes and len(shapes) != len(term.motors):
+        raise ModelError(f"term {term.key}: shapes", expected=f"{len(term.motors)} values", got=len(shapes))
+    return shapes[number] if shapes else typical
+
+
+def _per_motor(term: Coupling) -> int:
+    """Return how many parameters a shared motor has: inertia, viscous friction, then dry ones."""
+    return _DRY + len(term.frictions)
 
 
 def _kinds(term: Term) -> tuple[int, ...]:
     if type(term) not in _ELEMENTS:
         raise ModelError(
             f"term {term.key} cannot be simulated",
-            expected=", ".join(("inertia", "rotor", *(kind.key for kind in _ELEMENTS))),
+            expected=", ".join(("inertia", "rotor", *_COUPLED, *(kind.key for kind in _ELEMENTS))),
             remedy="leave it out of the model, or take an estimator that does not simulate, as wls",
         )
     return _ELEMENTS[type(term)]

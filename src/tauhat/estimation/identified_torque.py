@@ -16,6 +16,6 @@ def identified_torque(estimate: Estimate) -> ModelTorque:
     Raises
     ------
     ModelError
-        when a term has no value at a single state: gas springs and motors that turn with two joints.
+        when a term has no value at a single state: friction that warms up.
     """
     return model_torque(estimate.model, standard_with_rotors(estimate.model, estimate.base, estimate.values))

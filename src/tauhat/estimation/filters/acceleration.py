@@ -11,14 +11,13 @@ from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.dynamics.motion import Motion
+from tauhat.dynamics.simulated_arm import rotor_entries
 from tauhat.dynamics.terms import INERTIAL_SYMBOLS, Inertia, RotorInertia
 from tauhat.dynamics.terms.simplified import InertiaWithoutProducts
 from tauhat.dynamics.tree import kernel_tree
-from tauhat.errors import ModelError
 from tauhat.estimation.filters.points_kernel import points_kernel
 
 _BODIES = (Inertia, InertiaWithoutProducts, RotorInertia)
-_ACCELERATED = ("Iam",)  # symbols of other terms that act on accelerations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -27,7 +26,8 @@ class PointAccelerations:
 
     links : of the robot, as kernels read them
     inertial, rotor : base parameters that are of links and of rotors
-    inertial_place, rotor_place : where they go in (n_v, 10) and (n_v,), flattened
+    inertial_place, rotor_place : where they go in (n_v, 10) and (n_v, n_v), flattened
+    rotor_share : how often they do
     others : the model of all other terms, None when there is none
     layout : its columns
     other_place : base parameter of each of its parameters, -1 where it is none
@@ -39,12 +39,20 @@ class PointAccelerations:
     inertial_place: IntArray
     rotor: IntArray
     rotor_place: IntArray
+    rotor_share: FloatArray
     others: TorqueModel | None
     layout: Layout | None
     other_place: IntArray
 
     def __post_init__(self) -> None:
-        for array in (self.inertial, self.inertial_place, self.rotor, self.rotor_place, self.other_place):
+        for array in (
+            self.inertial,
+            self.inertial_place,
+            self.rotor,
+            self.rotor_place,
+            self.rotor_share,
+            self.other_place,
+        ):
             read_only(array)
 
     def at(self, q: FloatArray, dq: FloatArray, tau: FloatArray, values: FloatArray) -> FloatArray:
@@ -61,12 +69,12 @@ class PointAccelerations:
             when a mass matrix is not positive definite.
         """
         n = q.shape[0]
-        inertia, rotor = np.zeros((n, 10 * self.n_v)), np.zeros((n, self.n_v))
+        inertia, rotor = np.zeros((n, 10 * self.n_v)), np.zeros((n, self.n_v**2))
         inertia[:, self.inertial_place] = values[:, self.inertial]
-        rotor[:, self.rotor_place] = values[:, self.rotor]
+        rotor[:, self.rotor_place] = self.rotor_share * values[:, self.rotor]
         free = np.ascontiguousarray(tau - self._other_torque(q, dq, values))
         out = np.empty((n, self.n_v))
-        bodies = (inertia.reshape(n, self.n_v, 10), rotor)
+        bodies = (inertia.reshape(n, self.n_v, 10), rotor.reshape(n, self.n_v, self.n_v))
         states = (np.ascontiguousarray(q), np.ascontiguousarray(dq), free)
         if points_kernel(self.links, bodies, states, out) >= 0:
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
@@ -84,28 +92,18 @@ class PointAccelerations:
 
 
 def point_accelerations(model: TorqueModel, base: BaseParameters) -> PointAccelerations:
-    """Return the forward dynamics of a model.
-
-    Raises
-    ------
-    ModelError
-        when a term beside links and rotors acts on accelerations.
-    """
+    """Return the forward dynamics of a model; terms beside links and motors must not act on accelerations."""
     owners = [term for term in model.terms for _ in term.parameters(model.robot)]
     body = np.array([isinstance(term, _BODIES) for term in owners])
     place = np.full(model.n_p, -1)
     place[base.independent] = np.arange(base.n_b)
-    inertial, rotor = [], []
+    inertial = []
     for index in base.independent:
         parameter = model.parameters[index]
-        if parameter.symbol in _ACCELERATED:
-            raise ModelError(
-                f"{parameter.name} acts on two joints' accelerations", remedy="leave out the term for shared motors"
-            )
-        if body[index] and parameter.symbol in INERTIAL_SYMBOLS:
+        if parameter.symbol in INERTIAL_SYMBOLS:
             inertial.append((place[index], 10 * parameter.joint + INERTIAL_SYMBOLS.index(parameter.symbol)))
-        elif body[index]:
-            rotor.append((place[index], parameter.joint))
+    driven = [entry for entry in rotor_entries(model) if place[entry.parameter] >= 0]
+    rotor = [(place[entry.parameter], model.robot.n_v * entry.row + entry.column) for entry in driven]
     other_place = place[~body] if (~body).any() else np.zeros(0, dtype=np.intp)
     terms = tuple(term for term in model.terms if not isinstance(term, _BODIES))
     others = replace(model, terms=terms) if terms else None
@@ -116,6 +114,7 @@ def point_accelerations(model: TorqueModel, base: BaseParameters) -> PointAccele
         inertial_place=_column(inertial, 1),
         rotor=_column(rotor, 0),
         rotor_place=_column(rotor, 1),
+        rotor_share=np.array([entry.share for entry in driven], dtype=np.float64),
         others=others,
         layout=others.layout(np.flatnonzero(other_place >= 0)) if others is not None else None,
         other_place=other_place,

@@ -13,7 +13,7 @@ from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved, sw
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def points_kernel(links, bodies, states, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (n, n_v) from bodies ((n, n_v, 10), (n, n_v)) and states q, dq, tau; return a failed point or -1."""
+    """Fill `out` (n, n_v) from bodies ((n, n_v, 10), (n, n_v, n_v)) and q, dq, tau; return a failed point or -1."""
     inertia, rotor = bodies
     q, dq, tau = states
     n, n_v = q.shape
@@ -22,7 +22,8 @@ def points_kernel(links, bodies, states, out):  # type: ignore[no-untyped-def]
         sweep_outward(links, inertia[k], q[k], dq[k], work)
         bias_and_mass(links, work, bias, mass)
         for i in range(n_v):
-            mass[i, i] += rotor[k, i]
+            for j in range(n_v):
+                mass[i, j] += rotor[k, i, j]
             out[k, i] = tau[k, i] - bias[i]
         if factorised(mass) >= 0:
             return k
