@@ -23,7 +23,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from tauhat.dynamics.passive_kernel import ELEMENT, SIGN, VISCOUS
+from tauhat.dynamics.passive_kernel import ELEMENT, SIGN, VISCOUS, joint_elements
 from tauhat.recordings import Recording
 from tauhat.robots import load_robot, pinocchio_model
 from tauhat.sensing import ForceSensor, SensedModel
@@ -39,7 +39,7 @@ def arm(name: str) -> SensedModel:
     n_v = robot.n_v
     sliding = [(VISCOUS, j, 1.0, 2.0) for j in range(n_v)] + [(SIGN, j, WIDTH, 3.0) for j in range(n_v)]
     return SensedModel(
-        robot=robot, inertia=robot.inertia, rotor=np.full(n_v, 0.3), sliding=np.array(sliding, dtype=ELEMENT),
+        robot=robot, inertia=robot.inertia, rotor=np.full(n_v, 0.3), sliding=joint_elements(sliding),
         bristles=np.zeros(0, dtype=ELEMENT), rms=np.full(n_v, 0.5), slow=np.full(n_v, 0.02),
     )  # fmt: skip
 
@@ -78,7 +78,7 @@ def peer(model: SensedModel) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndar
         mass = pin.crba(pinned, data, y[0])
         coriolis = pin.computeCoriolisMatrix(pinned, data, y[0], y[1])
         gravity = pin.computeGeneralizedGravity(pinned, data, y[0])
-        p = mass @ y[1] + model.rotor * y[1]
+        p = mass @ y[1] + model.rotor @ y[1]
         drive = T[0] + coriolis.T @ y[1] - gravity - 2.0 * y[1] - 3.0 * np.tanh(y[1] / WIDTH)
         e = (p - state.get("p", p)) / h - 0.5 * (drive + state.get("drive", drive))
         state["p"], state["drive"] = p, drive

@@ -10,7 +10,7 @@ from scipy.signal import StateSpace, lsim
 from sensed_arms import RATE, frictionless, motion
 
 from tauhat.dynamics import base_parameters, torque_model
-from tauhat.dynamics.passive_kernel import DAHL, ELEMENT, LOAD_DAHL, VISCOUS
+from tauhat.dynamics.passive_kernel import DAHL, LOAD_DAHL, VISCOUS, joint_elements
 from tauhat.errors import ModelError, SensingError
 from tauhat.sensing.causal_filter import CausalFilter
 from tauhat.sensing.observers import OBSERVERS, observer_named
@@ -28,7 +28,7 @@ def sensed(name: str, external: np.ndarray, **changes: object) -> SensedTorque:
 
 
 def elements(*rows: tuple[int, int, float, float]) -> np.ndarray:
-    return np.array(list(rows), dtype=ELEMENT)
+    return joint_elements(rows)
 
 
 def first_time(response: np.ndarray, level: float) -> float:

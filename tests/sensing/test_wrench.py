@@ -79,6 +79,36 @@ def test_the_solution_is_that_of_weighted_least_squares_with_its_covariance():
     assert (found.covariance[3:] == 0.0).all()
 
 
+def test_errors_that_belong_together_are_weighted_by_their_whole_covariance():
+    rng = np.random.default_rng(5)
+    panda = load_robot("panda")
+    mixed = rng.normal(size=(7, 7))
+    covariance = mixed @ mixed.T
+    sizes = np.sqrt(covariance.diagonal())
+    correlation = covariance / np.outer(sizes, sizes)
+    solver = WrenchSolver(robot=panda, directions=DIRECTIONS["force"], largest=(1e6, 1e6), correlation=correlation)
+    q, tau, std, own = rng.uniform(-1.5, 1.5, 7), rng.normal(size=7), rng.uniform(0.3, 1.5, 7), rng.uniform(0.0, 0.5, 7)
+    jacobian = reference_jacobian(panda, q, solver.frame)[:3]
+    for beside in (np.zeros(7), own):
+        whole = np.diag(std) @ correlation @ np.diag(std) + np.diag(beside)
+        lower = np.linalg.cholesky(whole)  # NumPy's least squares on errors made alike and independent
+        expected = np.linalg.lstsq(np.linalg.solve(lower, jacobian.T), np.linalg.solve(lower, tau), rcond=None)[0]
+        found = solver.along(q[None], tau[None], std[None] ** 2, own=beside[None])
+        assert found.wrench[0, :3] == pytest.approx(expected, rel=1e-6)
+        inverse = np.linalg.inv(jacobian @ np.linalg.inv(whole) @ jacobian.T)
+        assert found.covariance[0, :3, :3] == pytest.approx(inverse, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "correlation",
+    [np.ones((6, 6)), 2.0 * np.eye(6), np.triu(np.full((6, 6), 0.1), 1) + np.eye(6)],
+    ids=["singular", "no ones on the diagonal", "not symmetric"],
+)
+def test_a_correlation_that_is_none_is_refused(correlation):
+    with pytest.raises(SensingError, match="correlation of the joints' errors"):
+        WrenchSolver(robot=UR5E, correlation=correlation)
+
+
 def test_near_a_singularity_the_answer_stays_small_and_says_what_it_does_not_know():
     straight = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])  # arm stretched upwards: fz loads no joint
     solver = WrenchSolver(robot=UR5E, largest=(500.0, 100.0))
@@ -128,3 +158,6 @@ def test_names_and_variances_are_checked():
         WrenchSolver(robot=UR5E, frame="hand")
     with pytest.raises(SensingError, match="variance of external torque"):
         WrenchSolver(robot=UR5E).at(HOME, np.zeros(6), np.zeros(6))
+    rows = np.zeros((1, 6))
+    with pytest.raises(SensingError, match="own variance"):
+        WrenchSolver(robot=UR5E).along(rows, rows, rows + 1.0, own=rows - 1.0)

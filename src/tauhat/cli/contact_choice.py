@@ -1,74 +1,122 @@
-"""From the options of `tauhat sense` to thresholds of contact, and the contacts along what was sensed."""
+"""From options of `tauhat sense` to thresholds of contact, the error they count in, and what is taken off before."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+
+from tauhat.cli.zero_choice import ZeroChoice
+from tauhat.errors import SensingError, TauhatWarning
 
 if TYPE_CHECKING:
-    from tauhat.sensing.contact import ContactEvent
+    from tauhat.recordings.log import Log
     from tauhat.sensing.contact_thresholds import ContactThresholds
-    from tauhat.sensing.sensed_log import SensedLog
     from tauhat.sensing.sensor import ForceSensor
+    from tauhat.sensing.zero import AirPass
+
+Source: TypeAlias = Literal["fit", "free motion", "thresholds"]
+"""Where the standard errors of a sensor come from."""
+
+
+class Prepared(NamedTuple):
+    """All that is known before the first log is judged.
+
+    sensor : with the error that was learnt
+    thresholds : of contact, in that error
+    air : pass that is taken off, None for none
+    source : of the error
+    """
+
+    sensor: ForceSensor
+    thresholds: ContactThresholds
+    air: AirPass | None
+    source: Source
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactChoice:
     """Where thresholds of contact come from.
 
-    free : logs without contact, to learn them from
-    thresholds : file to read them from; with free logs, to write them to
+    free : logs without contact, to learn thresholds and the sensor's error from
+    thresholds : file to read both from; with free logs, to write them to
     alarms : false ones an hour that are allowed
-    map_file : of the free logs
+    map_file : of the free logs and of the pass in air
+    zero : what is taken off
     """
 
-    free: tuple[Path, ...]
-    thresholds: Path | None
-    alarms: float
-    map_file: Path | None
+    free: tuple[Path, ...] = ()
+    thresholds: Path | None = None
+    alarms: float = 1.0
+    map_file: Path | None = None
+    zero: ZeroChoice = field(default_factory=ZeroChoice)
 
-    @property
-    def learns(self) -> bool:
-        """Whether thresholds are learnt here."""
-        return bool(self.free)
-
-    def limits(self, sensor: ForceSensor) -> ContactThresholds:
-        """Return the thresholds: learnt and written, read, or assumed where nothing is given.
+    def prepared(self, sensor: ForceSensor) -> Prepared:
+        """Return sensor and thresholds: learnt and written, read, or as the fit and experience have them.
 
         Raises
         ------
         TauhatError
-            files that cannot be read or written, logs of another robot.
+            files that cannot be read or written, logs of another robot, a zero that the thresholds do not know.
         """
-        from tauhat.recordings.reading import read_log
         from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
-        from tauhat.sensing.contact_thresholds import learn_contact_thresholds, load_contact_thresholds
 
+        air = self.zero.air_pass(sensor, self.map_file)
         if self.free:
-            logs = [read_log(log, map=self.map_file) for log in self.free]
-            learnt = learn_contact_thresholds(sensor, logs, rate=self.alarms)
-            if self.thresholds is not None:
-                learnt.save(self.thresholds)
-            return learnt
+            return self._learnt(sensor, air)
         if self.thresholds is not None:
-            return load_contact_thresholds(self.thresholds)
-        return assumed_contact_thresholds(sensor)
+            found = self._read(self.thresholds)
+            source: Source = "thresholds" if found.error is not None and found.error.is_learnt else "fit"
+            return Prepared(found.sensor_of(sensor), found, air, source)
+        return Prepared(sensor, assumed_contact_thresholds(sensor, rules=self.zero.rules), air, "fit")
+
+    def _learnt(self, sensor: ForceSensor, air: AirPass | None) -> Prepared:
+        from tauhat.recordings.reading import read_log
+        from tauhat.sensing.contact_thresholds import learn_contact_thresholds
+        from tauhat.sensing.learnt_error import error_of
+
+        if self.zero.log is not None and self.zero.log.resolve() in {log.resolve() for log in self.free}:
+            raise SensingError(
+                "the pass in air is no free motion to learn from", where=self.zero.log,
+                remedy="give another pass of the same motion with --free: what remains of it is what is learnt",
+            )  # fmt: skip
+        logs = [read_log(log, map=self.map_file) for log in self.free]
+        taught, source = _taught(sensor, logs, air)
+        learnt = learn_contact_thresholds(
+            sensor, logs, rate=self.alarms, rules=self.zero.rules, air=air, error=error_of(taught)
+        )
+        if self.thresholds is not None:
+            learnt.save(self.thresholds)
+        return Prepared(taught, learnt, air, source)
+
+    def _read(self, path: Path) -> ContactThresholds:
+        from tauhat.sensing.contact_thresholds import load_contact_thresholds
+
+        found, asked = load_contact_thresholds(path), self.zero.rules
+        if asked is not None and asked.zero != found.rules.zero:
+            raise SensingError(
+                "thresholds were learnt with another zero", where=path,
+                expected=f"seconds {found.rules.zero.seconds:g}, follow {found.rules.zero.follow:g}",
+                got=f"seconds {asked.zero.seconds:g}, follow {asked.zero.follow:g}",
+                remedy="leave the numbers out, or learn thresholds with this zero (--free)",
+            )  # fmt: skip
+        return found
 
 
-def found_contacts(thresholds: ContactThresholds, sensed: Sequence[SensedLog]) -> list[tuple[int, ContactEvent]]:
-    """Return the contacts of all logs, each with the place of its log.
+def _taught(sensor: ForceSensor, logs: Sequence[Log], air: AirPass | None) -> tuple[ForceSensor, Source]:
+    """Return the sensor with the error that it shows in free motion, where there is enough of it."""
+    from tauhat.sensing.free_logs import sensed_free, settled_seconds
+    from tauhat.sensing.free_motion import FEWEST_SECONDS, learnt_from_free_motion
 
-    Raises
-    ------
-    SensingError
-        when the thresholds are of other joints.
-    """
-    from tauhat.sensing.contact import ContactDetector
-
-    return [
-        (place, event)
-        for place, log in enumerate(sensed)
-        for event in ContactDetector(thresholds=thresholds, step=log.step).along(log).events
-    ]
+    seconds = settled_seconds(sensed_free(sensor, logs, air=air))
+    if seconds < FEWEST_SECONDS:
+        warnings.warn(
+            f"{seconds:.1f} s of free motion are too few to learn an error bar from, {FEWEST_SECONDS:g} s are needed: "
+            "error bars are those of the fit",
+            TauhatWarning,
+            stacklevel=3,
+        )
+        return sensor, "fit"
+    return learnt_from_free_motion(sensor, logs, air=air), "free motion"

@@ -14,17 +14,20 @@ from tauhat.cli.reporting import say
 if TYPE_CHECKING:
     from tauhat.arrays import FloatArray
     from tauhat.sensing.contact_thresholds import ContactThresholds
+    from tauhat.sensing.judged_log import Zero
     from tauhat.sensing.sensed_log import SampleCounts
     from tauhat.sensing.sensor import ForceSensor, Sensed
+    from tauhat.sensing.wrench import WrenchSolver
 
 
-_Judge: TypeAlias = "Callable[[Sensed], dict[str, Any]]"
+_Judge: TypeAlias = "Callable[[Sensed], tuple[Sensed, dict[str, Any]]]"
 
 
-def answer(sensor: ForceSensor, thresholds: ContactThresholds | None = None) -> None:
+def answer(sensor: ForceSensor, thresholds: ContactThresholds | None = None, *, zero: Zero = "as sensed") -> None:
     """Answer the samples on standard input until it ends; tell on standard error how many there were.
 
-    With thresholds each answer says whether something touches the arm, and where that begins or ends.
+    With thresholds each answer says whether something touches the arm, and where that begins or ends; the zero of a
+    standing arm can then be taken off torque and wrench.
 
     Raises
     ------
@@ -37,7 +40,7 @@ def answer(sensor: ForceSensor, thresholds: ContactThresholds | None = None) -> 
 
     stream = SensorStream(sensor=sensor, name="standard input")
     memory, malformed, n_v = stream.start(), 0, sensor.n_v
-    judge: _Judge = _no_contacts if thresholds is None else _contacts(thresholds, sensor)
+    judge: _Judge = _no_contacts if thresholds is None else _contacts(thresholds, sensor, zero)
     for sample in read_samples(sys.stdin.buffer, sensor.model.robot):
         sized = sample is not None and len(sample.q) == n_v == len(sample.tau)
         if sample is None or (not sized and memory.counts.taken):
@@ -45,7 +48,8 @@ def answer(sensor: ForceSensor, thresholds: ContactThresholds | None = None) -> 
             continue
         memory, sensed = stream.take(memory, sample.t, np.array(sample.q), np.array(sample.tau))
         if sensed is not None:
-            sys.stdout.write(json.dumps(_answered(sample.t, sensed) | judge(sensed), allow_nan=False) + "\n")
+            told, said = judge(sensed)
+            sys.stdout.write(json.dumps(_answered(sample.t, told) | said, allow_nan=False) + "\n")
             sys.stdout.flush()
     counts = memory.counts._replace(malformed=malformed)
     if not counts.taken:
@@ -63,11 +67,11 @@ def _answered(t: float, sensed: Sensed) -> dict[str, Any]:
     }
 
 
-def _no_contacts(sensed: Sensed) -> dict[str, Any]:  # noqa: ARG001
-    return {}
+def _no_contacts(sensed: Sensed) -> tuple[Sensed, dict[str, Any]]:
+    return sensed, {}
 
 
-def _contacts(thresholds: ContactThresholds, sensor: ForceSensor) -> _Judge:
+def _contacts(thresholds: ContactThresholds, sensor: ForceSensor, zero: Zero) -> _Judge:
     """Return what says of each sample in turn whether something touches the arm."""
     from tauhat.sensing.contact import ContactDetector
 
@@ -75,16 +79,24 @@ def _contacts(thresholds: ContactThresholds, sensor: ForceSensor) -> _Judge:
     detector.check_joints(tuple(sensor.model.robot.joint_names), where="standard input")
     memory, touched = detector.start(), False
 
-    def judge(sensed: Sensed) -> dict[str, Any]:
+    def judge(sensed: Sensed) -> tuple[Sensed, dict[str, Any]]:
         nonlocal memory, touched
         memory, found = detector.advance(memory, sensed.tau, sensed.variance, sensed.dq, settled=sensed.settled)
         said: dict[str, Any] = {"contact": found.contact, "excess": float(f"{found.excess:.4g}"), "link": found.link}
         if found.contact != touched:
             said["event"] = "start" if found.contact else "end"
         touched = found.contact
-        return said
+        return (_less(sensed, found.zero, sensor.solver) if zero == "standing" else sensed), said
 
     return judge
+
+
+def _less(sensed: Sensed, zero: FloatArray, solver: WrenchSolver) -> Sensed:
+    """Return a sample less a zero of the joints; the wrench is solved again, as `zeroed` does along a log."""
+    tau = sensed.tau - zero
+    samples = (value[None] for value in (sensed.q, tau, sensed.variance))
+    found = solver.along(*samples, own=np.square(sensed.lag)[None])
+    return sensed._replace(tau=tau, wrench=found.wrench[0], covariance=found.covariance[0])
 
 
 def _short(values: FloatArray) -> list[float]:

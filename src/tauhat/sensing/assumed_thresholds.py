@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tauhat.sensing.contact_thresholds import ContactRules, ContactThresholds
+from tauhat.sensing.contact_rules import ContactRules
+from tauhat.sensing.contact_thresholds import ContactThresholds
 from tauhat.sensing.sensor import ForceSensor
 
 # In standard errors: settling, resting, standing while others move, slow, fast. What two arms with heavy gears showed

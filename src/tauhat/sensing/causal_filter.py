@@ -16,7 +16,7 @@ from tauhat.arrays import FloatArray, read_only
 from tauhat.errors import SensingError
 
 _DAMPING = np.sqrt(2.0)
-_MOST = 0.45  # of the sample rate: a filter nearer to half of it is none
+HIGHEST = 0.45  # of the sample rate: a filter nearer to half of it is none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,9 +33,9 @@ class CausalFilter:
     def __post_init__(self) -> None:
         if not 0.0 < self.step < np.inf:
             raise SensingError("time between samples", expected="above zero", got=f"{self.step} s")
-        if not 0.0 < self.cutoff <= _MOST / self.step:
+        if not 0.0 < self.cutoff <= HIGHEST / self.step:
             raise SensingError(
-                "cut-off of the filter", expected=f"0 to {_MOST / self.step:.4g} Hz at {1.0 / self.step:.4g} Hz",
+                "cut-off of the filter", expected=f"0 to {HIGHEST / self.step:.4g} Hz at {1.0 / self.step:.4g} Hz",
                 got=f"{self.cutoff:g} Hz", remedy="a lower cut-off, or a log of a higher rate",
             )  # fmt: skip
 

@@ -16,6 +16,7 @@ from tauhat.arrays import FloatArray, read_only
 from tauhat.errors import SensingError
 from tauhat.sensing.contact_kernel import RESTING, ROWS, SETTLING, STATES, judge
 from tauhat.sensing.contact_thresholds import CONDITIONS, ContactThresholds, judged_rows
+from tauhat.sensing.payload_check import PayloadCheck
 from tauhat.sensing.sensed_log import SensedLog
 
 _BEFORE = 0.2  # seconds before the start of a contact: what is sensed there is not its
@@ -28,21 +29,24 @@ class ContactEvent:
 
     start, end : [s]; found at `start`, gone below the release at `end`
     link : the link, by its joint, that is touched, or one further out
-    peak : largest force at the sensor's frame less that of the zero's moment [N]
+    peak, peak_std : largest force at the sensor's frame less that just before, and the force's standard error there [N]
     excess : largest residual in parts of the threshold
     torque : (n_v,) external torque at that moment, zeroed [Nm or N]
     fast : whether a joint was faster than in the free motion of the thresholds
     open : whether it lasted to the end of the log
+    payload : whether a body that is carried explains it; None where it is too short to tell, or nobody asked
     """
 
     start: float
     end: float
     link: str
     peak: float
+    peak_std: float
     excess: float
     torque: FloatArray
     fast: bool
     open: bool
+    payload: PayloadCheck | None = None
 
     def __post_init__(self) -> None:
         read_only(self.torque)
@@ -50,8 +54,10 @@ class ContactEvent:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
         return {
-            "start": self.start, "end": self.end, "link": self.link, "peak": self.peak, "excess": self.excess,
+            "start": self.start, "end": self.end, "link": self.link, "peak": self.peak,
+            "peak_std": self.peak_std, "excess": self.excess,
             "torque": self.torque.tolist(), "fast": self.fast, "open": self.open,
+            "payload": None if self.payload is None else self.payload.to_dict(),
         }  # fmt: skip
 
 
@@ -175,24 +181,20 @@ class ContactDetector:
         )  # fmt: skip
 
     def check_joints(self, names: tuple[str, ...], *, where: str) -> None:
-        """Pass where the thresholds are of these joints.
-
-        Raises
-        ------
-        SensingError
-            when they are of others.
-        """
-        if names != self.thresholds.joint_names:
-            expected = ", ".join(self.thresholds.joint_names)
-            raise SensingError("thresholds of another robot", where=where, expected=expected, got=", ".join(names))
+        """Pass where the thresholds are of these joints; see `ContactThresholds.check_joints`."""
+        self.thresholds.check_joints(names, where=where)
 
     def _event(self, log: SensedLog, out: FloatArray, told: FloatArray, zero: FloatArray, span: slice) -> ContactEvent:
         top = span.start + int(out[span, 1].argmax())
         before = max(0, span.start - round(_BEFORE / log.step))
         force = log.wrench[span, :3] - log.wrench[before, :3]
+        sizes = np.linalg.norm(force, axis=1)
+        at = int(sizes.argmax())
+        towards = force[at] / max(float(sizes[at]), np.finfo(float).tiny)
         return ContactEvent(
             start=float(log.t[span.start]), end=float(log.t[span.stop - 1]), link=self._link(told[span].max(axis=0)),
-            peak=float(np.linalg.norm(force, axis=1).max()), excess=float(out[top, 1]),
+            peak=float(sizes[at]), peak_std=float(np.linalg.norm(towards * log.wrench_std[span.start + at, :3])),
+            excess=float(out[top, 1]),
             torque=log.tau[top] - zero[top], fast=bool(out[span, 3].any()), open=bool(span.stop == log.n_t),
         )  # fmt: skip
 

@@ -17,9 +17,9 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -30,52 +30,22 @@ from tauhat.plain_data import without_infinities
 from tauhat.recordings.log import Log
 from tauhat.recordings.recording import Recording
 from tauhat.sensing.contact_kernel import MOVING, RESTING, ROWS, SETTLING, STATES, judge_along
+from tauhat.sensing.contact_rules import ContactRules
+from tauhat.sensing.free_logs import sensed_free
+from tauhat.sensing.learnt_error import LearntError, error_of
 from tauhat.sensing.sensed_log import SensedLog
 from tauhat.sensing.sensor import ForceSensor
-from tauhat.sensing.zero import StandingZero
+from tauhat.sensing.zero import AirPass, StandingZero
+
+TakenOff: TypeAlias = Literal["nothing", "air"]
+"""What was taken off the external torque before thresholds were learnt: nothing, or a pass in air."""
 
 CONDITIONS = ("settling", "resting", "moving")
-SCHEMA, SCHEMA_VERSION = "tauhat/contact-thresholds", 1
+SCHEMA, SCHEMA_VERSION = "tauhat/contact-thresholds", 2
 _STEPS = (0.3, 1.0)  # of each joint's top speed in free motion, where steps of its scale end
 _FEWEST = 0.5  # seconds of a condition that give a scale of its own
 _HOUR = 3600.0
 _OUT_OF_REACH = 1e12  # limits with which nothing counts as contact, as is known of free motion
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ContactRules:
-    """How contact is told from free motion; learning and detecting share them.
-
-    release : part of the threshold below which a contact ends
-    settle : standing for less, the arm settles: friction and controller creep for a while [s]
-    quiet : at the start of a log nothing is told for so long [s]
-    zero : what is taken off
-    block : length of the blocks whose maxima count [s]; longer than a residual remembers
-    margin : on the largest residual, where free motion is too short for the rate
-    least : no threshold is below so many standard errors that the sensor states; short pauses look too quiet
-    """
-
-    release: float = 0.7
-    settle: float = 1.5
-    quiet: float = 0.5
-    zero: StandingZero = field(default_factory=StandingZero)
-    block: float = 2.0
-    margin: float = 1.1
-    least: float = 2.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.release <= 1.0:
-            raise SensingError("release of a contact", expected="above 0, at most 1", got=self.release)
-        if not (min(self.settle, self.quiet, self.least) >= 0.0 and self.block > 0.0 and self.margin >= 1.0):
-            raise SensingError(
-                "rules of contact", expected="settle, quiet, least of at least 0, block above 0, margin of at least 1",
-                got=f"{self.settle}, {self.quiet}, {self.least}, {self.block}, {self.margin}",
-            )  # fmt: skip
-
-    def way(self, step: float) -> FloatArray:
-        """Return the numbers that the kernel reads, (7,), for samples `step` seconds apart."""
-        zero = self.zero
-        return np.array([self.release, step, self.settle, zero.seconds, zero.fade, zero.follow, self.quiet])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,6 +60,8 @@ class ContactThresholds:
     promised : false alarms an hour that this much free motion can promise; above `rate` where it is too short
     seconds : (3,) of free motion settling, resting and moving
     spread : largest residual of one recording over that of the others; nan with a single one
+    error : of the sensor, in whose standard errors the limits are; None: whatever the sensor has
+    taken_off : what has to be taken off the torque before it is judged
     """
 
     joint_names: tuple[str, ...]
@@ -100,6 +72,8 @@ class ContactThresholds:
     promised: float
     seconds: FloatArray
     spread: float
+    error: LearntError | None = None
+    taken_off: TakenOff = "nothing"
 
     def __post_init__(self) -> None:
         n_v, where = len(self.joint_names), "contact thresholds"
@@ -108,6 +82,10 @@ class ContactThresholds:
         object.__setattr__(self, "edges", edges)
         object.__setattr__(self, "limits", frozen("limits", self.limits, (2 + len(edges), n_v), where=where))
         object.__setattr__(self, "seconds", frozen("seconds", self.seconds, (len(CONDITIONS),), where=where))
+        if self.error is not None and self.error.rms.size != n_v:
+            raise SensingError("error of contact thresholds", expected=f"{n_v} joints", got=self.error.rms.size)
+        if self.taken_off not in {"nothing", "air"}:
+            raise SensingError("what thresholds are behind", expected="nothing or air", got=str(self.taken_off)[:60])
         if not ((self.limits > 0.0).all() and (edges > 0.0).all() and (np.diff(edges, axis=0) >= 0.0).all()):
             raise SensingError("thresholds of contact", expected="above zero, speeds increasing")
 
@@ -115,6 +93,30 @@ class ContactThresholds:
     def n_v(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
+
+    def sensor_of(self, sensor: ForceSensor) -> ForceSensor:
+        """Return the sensor with the error in which these thresholds count.
+
+        Raises
+        ------
+        SensingError
+            when the sensor has other joints.
+        """
+        self.check_joints(sensor.model.robot.joint_names, where="sensor")
+        return sensor if self.error is None else self.error.on(sensor)
+
+    def check_joints(self, names: tuple[str, ...], *, where: str) -> None:
+        """Pass where the thresholds are of these joints.
+
+        Raises
+        ------
+        SensingError
+            when they are of others.
+        """
+        if tuple(names) != self.joint_names:
+            raise SensingError(
+                "thresholds of another robot", where=where, expected=", ".join(self.joint_names), got=", ".join(names)
+            )
 
     @property
     def keeps_rate(self) -> bool:
@@ -128,7 +130,8 @@ class ContactThresholds:
             "edges": self.edges.tolist(), "limits": self.limits.tolist(), "rules": asdict(self.rules),
             "rate": self.rate, "promised": self.promised, "keeps_rate": self.keeps_rate,
             "seconds": dict(zip(CONDITIONS, self.seconds.tolist(), strict=True)),
-            "spread": self.spread,
+            "spread": self.spread, "error": None if self.error is None else self.error.to_dict(),
+            "taken_off": self.taken_off,
         }  # fmt: skip
         return dict(without_infinities(data))
 
@@ -176,6 +179,8 @@ def _from_dict(data: dict[str, Any]) -> ContactThresholds:
         promised=_endless(data["promised"]),
         seconds=np.array([data["seconds"][name] for name in CONDITIONS], dtype=np.float64),
         spread=np.nan if data["spread"] is None else float(data["spread"]),
+        error=LearntError(**data["error"]) if data.get("error") else None,
+        taken_off=data.get("taken_off", "nothing"),
     )  # fmt: skip
 
 
@@ -184,15 +189,26 @@ def _endless(value: float | None) -> float:
 
 
 def learn_contact_thresholds(
-    sensor: ForceSensor, free: Sequence[Recording | Log], *, rate: float = 1.0, rules: ContactRules | None = None
+    sensor: ForceSensor,
+    free: Sequence[Recording | Log],
+    *,
+    rate: float = 1.0,
+    rules: ContactRules | None = None,
+    air: AirPass | None = None,
+    error: LearntError | None = None,
 ) -> ContactThresholds:
     """Return thresholds learnt on recordings without contact; the model should not have been fitted on them.
 
     Parameters
     ----------
-    free : recordings in which nothing touches the arm, at the speeds of the task and with its pauses
+    free : recordings in which nothing touches the arm, at the speeds of the task and with its pauses; of any sample
+        rate that the sensor's filter allows
     rate : of false alarms [1/h]
     rules : hysteresis, zero, blocks; as stated in `ContactRules` by default
+    air : pass in air that is taken off first, as it is off the logs that are judged
+    error : in whose standard errors limits count, as `learnt_from_free_motion` has it (`error_of`); the sensor's own by
+        default. The floor of the limits stays that of the sensor given here: an arm at rest is no worse known for an
+        error that was learnt in motion
 
     Raises
     ------
@@ -204,17 +220,28 @@ def learn_contact_thresholds(
     TauhatWarning
         when the recordings are too short to promise the rate, or differ so much that one alarms on the others' limits.
     """
-    return thresholds_of([sensor.along(log) for log in free], slow=sensor.model.slow, rate=rate, rules=rules)
+    own, followed = error_of(sensor), rules or ContactRules()
+    counted = own if error is None else error
+    sensed = sensed_free(counted.on(sensor), free, air=air)
+    floor = followed.least * own.sizes / counted.sizes
+    found = thresholds_of(sensed, slow=sensor.model.slow, rate=rate, rules=followed, floor=floor)
+    return replace(found, error=counted, taken_off="nothing" if air is None else "air")
 
 
 def thresholds_of(
-    free: Sequence[SensedLog], *, slow: FloatArray, rate: float = 1.0, rules: ContactRules | None = None
+    free: Sequence[SensedLog],
+    *,
+    slow: FloatArray,
+    rate: float = 1.0,
+    rules: ContactRules | None = None,
+    floor: FloatArray | None = None,
 ) -> ContactThresholds:
     """Return the same from what was already sensed in free motion.
 
     Parameters
     ----------
     slow : (n_v,) speed below which a joint stands [rad/s or m/s]
+    floor : (n_v,) no limit is below it, in standard errors; `rules.least` by default
     """
     if not free or not any(log.settled.any() for log in free):
         raise SensingError(
@@ -230,8 +257,9 @@ def thresholds_of(
     maxima = [np.concatenate([log.maxima(scale, kind) for log in judged]) for kind in range(len(CONDITIONS))]
     levels, promised = _levels(maxima, rate * followed.block / _HOUR, followed.margin)
     of_rows = np.concatenate([levels[[SETTLING, RESTING]], np.full(len(edges), levels[MOVING])])
+    least = np.full(len(free[0].joint_names), followed.least) if floor is None else floor
     found = ContactThresholds(
-        joint_names=free[0].joint_names, edges=edges, limits=np.maximum(of_rows[:, None] * scale, followed.least),
+        joint_names=free[0].joint_names, edges=edges, limits=np.maximum(of_rows[:, None] * scale, least),
         rules=followed, rate=rate, promised=promised * _HOUR / followed.block,
         seconds=np.sum([log.seconds for log in judged], axis=0), spread=_spread(judged, scale),
     )  # fmt: skip
@@ -291,11 +319,12 @@ def _scales(free: Sequence[_FreeLog], n_rows: int) -> FloatArray:
     """Return the root mean square by condition and joint; the joint's largest where a condition hardly occurred."""
     x, row = (np.concatenate([getattr(log, name) for log in free]) for name in ("x", "row"))
     scale = np.full((n_rows, x.shape[1]), np.nan)
+    step = np.repeat([log.step for log in free], [len(log.x) for log in free])[:, None]
     for k in range(n_rows):
-        there = row == k
-        counts = there.sum(axis=0)
-        enough = counts * free[0].step >= _FEWEST
-        scale[k, enough] = np.sqrt((np.square(x) * there).sum(axis=0)[enough] / counts[enough])
+        there = step * (row == k)
+        seconds = there.sum(axis=0)
+        enough = seconds >= _FEWEST
+        scale[k, enough] = np.sqrt((np.square(x) * there).sum(axis=0)[enough] / seconds[enough])
     if np.isnan(scale).all(axis=0).any():
         raise SensingError(
             "free motion is too short for any threshold", expected=f"{_FEWEST} s of one condition or more"

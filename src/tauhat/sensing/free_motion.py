@@ -1,4 +1,17 @@
-"""How wrong a sensor is where nothing touches the arm: the error bar that free motion teaches."""
+"""How wrong a sensor is where nothing touches the arm: the error bars that free motion teaches.
+
+Within a log the error is slow: one temperature, one torque constant, one zero. Logs are therefore the values of a
+statistics of few. With z the sensed torque of a log in parts of its standard error, log by log, (n, n_v):
+
+    s_j^2 = mean of z_j^2               s_j of the others: without the log itself
+    c = 95 % quantile of |z_j| / s_j of the others, over all logs and joints, in parts of 1.96
+    standard errors are told c s_j times as large; a bar of 1.96 of them then holds 95 % of a log it has not seen
+    R = mean of z z', scaled to ones on its diagonal, shrunk to the unit matrix by
+    l = sum of the variances of the R_ij between logs / sum of R_ij^2,  i not j
+
+Sources: Stone, "Cross-validatory choice and assessment of statistical predictions", 1974 (each log by the others);
+Schaefer, Strimmer, "A shrinkage approach to large-scale covariance matrix estimation", 2005.
+"""
 
 from __future__ import annotations
 
@@ -7,36 +20,111 @@ from dataclasses import replace
 
 import numpy as np
 
+from tauhat.arrays import FloatArray
 from tauhat.errors import SensingError
 from tauhat.recordings.log import Log
 from tauhat.recordings.recording import Recording
+from tauhat.sensing.free_logs import sensed_free
+from tauhat.sensing.sensed_log import SensedLog
 from tauhat.sensing.sensor import ForceSensor
+from tauhat.sensing.zero import AirPass
 
-_FEWEST = 10.0  # seconds of settled free motion from which an error is told
+FEWEST_SECONDS = 10.0  # of settled free motion from which an error is told
+_FEWEST_PARTS = 4  # logs from which each is one value; fewer are cut
+_PART = 10.0  # [s] of such a cut, or less where there would be too few
+_INTERVAL, _SHARE = 1.96, 0.95
+_TINY = float(np.finfo(float).tiny)
 
 
-def learnt_from_free_motion(sensor: ForceSensor, logs: Sequence[Recording | Log]) -> ForceSensor:
-    """Return the sensor with the error of each joint that it shows along logs without contact.
+def learnt_from_free_motion(
+    sensor: ForceSensor, logs: Sequence[Recording | Log], *, air: AirPass | None = None
+) -> ForceSensor:
+    """Return the sensor with the error of each joint, and what errors have in common, that logs without contact show.
 
     The residual of a fit is that of the motion it was fitted to. At other speeds, in other places and at another
-    temperature the model is more wrong: logs of the work, done in air, tell by how much. What is not known of bristles
-    is added to it as before.
+    temperature the model is more wrong: logs of the work, done in air, tell by how much. The rms of the sensed torque
+    becomes that of the model (`SensedModel.rms`), by which observers go that learn themselves. What is not known of
+    bristles and warmth is already in it, so the standard errors that are told are stretched until they fit
+    (`SensedModel.stretch`), and the wrench is solved with the correlation of the joints (`WrenchSolver.correlation`).
 
     Parameters
     ----------
-    logs : without any contact, at the speeds of the work
+    logs : without any contact, at the speeds of the work, at any rate that the filter allows; several short ones on
+        different ways, cold and warm, tell more than a long one
+    air : pass that is taken off them, as it is off the work
 
     Raises
     ------
     SensingError
         when there are less than ten seconds of it, or a log does not suit the sensor.
     """
-    sensed = [sensor.along(log) for log in logs]
-    torques = np.concatenate([log.tau[log.settled] for log in sensed]) if sensed else np.zeros((0, sensor.n_v))
-    seconds = len(torques) * sensor.step
-    if seconds < _FEWEST:
+    unstretched = np.ones(sensor.n_v)
+    plain = replace(sensor, model=replace(sensor.model, stretch=unstretched))
+    rms = error_in_free_motion(sensed_free(plain, logs, air=air))
+    plain = replace(plain, model=replace(plain.model, rms=rms))
+    parts = _parts(sensed_free(plain, logs, air=air))
+    model = replace(plain.model, stretch=_stretch(parts))
+    return replace(plain, model=model, wrench=replace(sensor.solver, correlation=shrunk_correlation(parts)))
+
+
+def error_in_free_motion(free: Sequence[SensedLog]) -> FloatArray:
+    """Return the root mean square of what was sensed where nothing touches the arm, over time, (n_v,) [Nm or N].
+
+    Raises
+    ------
+    SensingError
+        when there are less than ten seconds of it.
+    """
+    seconds = sum(float(np.count_nonzero(log.settled)) * log.step for log in free)
+    if seconds < FEWEST_SECONDS:
         raise SensingError(
-            "too little free motion to learn an error from", expected=f"{_FEWEST:g} s", got=f"{seconds:.1f} s"
+            "too little free motion to learn an error from", expected=f"{FEWEST_SECONDS:g} s", got=f"{seconds:.1f} s"
         )
-    rms = np.maximum(np.sqrt(np.mean(torques**2, axis=0)), np.finfo(float).tiny)
-    return replace(sensor, model=replace(sensor.model, rms=rms))
+    squares = np.sum([log.step * np.square(log.tau[log.settled]).sum(axis=0) for log in free], axis=0)
+    return np.asarray(np.maximum(np.sqrt(squares / seconds), _TINY))
+
+
+def shrunk_correlation(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return the correlation about zero of columns (n, k), as far as parts agree on it, (k, k).
+
+    Parameters
+    ----------
+    parts : two or more, independent of each other; one that is alike within itself counts as one value
+    """
+    shares = np.array([len(part) for part in parts]) / sum(len(part) for part in parts)
+    products = np.stack([part.T @ part / len(part) for part in parts])
+    whole = np.einsum("p,pij->ij", shares, products)
+    sizes = np.sqrt(np.maximum(whole.diagonal(), _TINY))
+    found, products = whole / np.outer(sizes, sizes), products / np.outer(sizes, sizes)
+    apart = np.einsum("p,pij->ij", shares, np.square(products - found)) / (len(parts) - 1)
+    beside = ~np.eye(len(sizes), dtype=np.bool_)
+    size = float(np.square(found[beside]).sum())
+    shrunk = min(1.0, float(apart[beside].sum()) / size) if size > 0.0 else 1.0
+    return np.where(beside, (1.0 - shrunk) * found, 1.0)
+
+
+def _parts(free: Sequence[SensedLog]) -> list[FloatArray]:
+    """Return sensed torque in parts of its standard error, (n, n_v), log by log; a few logs are cut."""
+    least = 1 if len(free) >= _FEWEST_PARTS else -(-_FEWEST_PARTS // len(free))
+    parts: list[FloatArray] = []
+    for log in free:
+        rows = log.tau[log.settled] / np.maximum(log.tau_std[log.settled], _TINY)
+        cuts = 1 if least == 1 else max(least, int(len(rows) * log.step / _PART))
+        parts += [part for part in np.array_split(rows, cuts) if len(part)]
+    return parts
+
+
+def _stretch(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return how many times larger standard errors have to be told, (n_v,)."""
+    counts = np.array([len(part) for part in parts])[:, None]
+    squares = np.stack([np.square(part).sum(axis=0) for part in parts])
+    size = np.sqrt(squares.sum(axis=0) / counts.sum())
+    of_others = np.sqrt((squares.sum(axis=0) - squares) / (counts.sum() - counts))
+    seen = size > 0.0
+    if not seen.any():
+        return np.ones(len(size))
+    unseen = [
+        np.abs(part[:, seen]) / np.maximum(others[seen], _TINY) for part, others in zip(parts, of_others, strict=True)
+    ]
+    wider = float(np.quantile(np.concatenate(unseen), _SHARE)) / _INTERVAL
+    return np.where(seen, wider * size, 1.0)

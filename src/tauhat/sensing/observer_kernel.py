@@ -12,14 +12,16 @@ The observers smooth e, each exact for the sample time (tau_ext constant between
     3 sliding mode         super-twisting on p, implicit, so that it does not chatter; then as 1
     4 disturbance          tau' = X^-1 M^-1 (M y'' + b + sliding - T - tau), implicit, without y''
     5 Kalman               p+ = p + h (drive + d), d+ = d, corrected by the measured p with constant gains
-    6 thermal              1, with friction that warms up beside it (`thermal_kernel`)
+    6 thermal, refresh     1, with friction that warms up or changes beside it (`thermal_kernel`)
 The variance adds the model's error, `rms^2`, and what is not known of the bristles: `(weight load)^2 P`, with
 `P+ = P exp(-2 |moved| / w) + P_slid (1 - exp(-2 |moved| / w))`, and no less than `P_turned` behind a reversal.
+`stretch^2` times that is told; observers themselves go by it as it is.
 
 `rows` is the memory, (ROWS, n_v): 0 position as measured (nan at the start), 1-2 y, y', 3-4 T, T', 5 u, 6 p, 7 drive,
-8-10 the observer's own, 11 load, 12 direction, 13-20 warmth (6 alone). `bent` (2, n_bristles): states and their
-variances. `plan` is the filter's 10 numbers, the observer's gains (n_v, 4), the model's error rms (n_v,); kind, h,
-P_start, P_turned, P_slid; and `heat` of `thermal_kernel`, empty but for 6.
+8-10 the observer's own, 11 load, 12 the u of this sample, 13-20 warmth (6 alone). `bent` (3, n_bristles): states, their
+variances, direction of the last displacement. `plan` is the filter's 10 numbers, the observer's gains (n_v, 4), the
+model's error rms and stretch (2, n_v); kind, h, P_start, P_turned, P_slid; and `heat` of `thermal_kernel`, empty
+but for 6.
 Filled: `out` (5, n_v): tau_ext, its variance, y, y', e.
 
 Sources: De Luca and Mattone 2003 (1); Mohammadi et al. 2013 (4); Garofalo et al. 2019 (3); Wahrburg et al. 2018 (5);
@@ -33,7 +35,7 @@ from numba import njit
 
 from tauhat.dynamics.forward_kernel import bias_and_mass, factorised, solved, sweep_outward
 from tauhat.dynamics.momentum_kernel import momentum_kernel
-from tauhat.dynamics.passive_kernel import bent_by, passive_kernel
+from tauhat.dynamics.passive_kernel import bent_by, passive_kernel, turned_by
 from tauhat.sensing.thermal_kernel import add_warm_friction, feel_warmth, follow_warmth
 
 INVERSE, FIRST, SECOND, SLIDING, DISTURBANCE, KALMAN, THERMAL = range(7)
@@ -48,7 +50,7 @@ def observe(body, plan, sample, memory, out):  # type: ignore[no-untyped-def]
     `memory` is rows, bent, work (SCRATCH, n_v), link work (40 n_v,), mass (n_v, n_v). Only the disturbance observer can
     fail, where the mass matrix is that of no body.
     """
-    numbers, gains, rms, rest, heat = plan
+    numbers, gains, errors, rest, heat = plan
     rows, bent, work, links_work, mass = memory
     if np.isnan(rows[0, 0]):
         _begin(sample, rest[2], rows, bent)
@@ -61,18 +63,21 @@ def observe(body, plan, sample, memory, out):  # type: ignore[no-untyped-def]
         add_warm_friction(heat, rows, work[_FRICTION])
     _pushed(rest, rows, work, out[4])
     if rest[0] == INVERSE:
-        for i in range(rows.shape[1]):
-            out[4, i] = work[_RIGID, i] + body[2][i] * work[_ACCELERATION, i] + work[_FRICTION, i] - rows[3, i]
-    _uncertainty(body[4], rms, rows, bent, out)
+        _missed(body[2], rows, work, out[4])
+    _uncertainty(body[4], errors[0], rows, bent, out)
     for i in range(rows.shape[1]):
         out[2, i], out[3, i] = rows[1, i], rows[2, i]
+    done = True
     if rest[0] == DISTURBANCE:
-        return _disturbance(gains, (body[2], rest[1]), (mass, work), rows, out[0])
-    for i in range(rows.shape[1]):
-        out[0, i] = _smoothed(int(rest[0]), gains[i], rest[1], (out[4, i], work[_DRIVE, i]), rows[:, i])
+        done = _disturbance(gains, (body[2], rest[1]), (mass, work), rows, out[0])
+    else:
+        for i in range(rows.shape[1]):
+            out[0, i] = _smoothed(int(rest[0]), gains[i], rest[1], (out[4, i], work[_DRIVE, i]), rows[:, i])
     if rest[0] == THERMAL:
-        follow_warmth(rms, heat, rows, out)
-    return True
+        follow_warmth(errors[0], heat, rows, out)
+    for i in range(rows.shape[1]):
+        out[1, i] *= errors[1, i] * errors[1, i]
+    return done
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
@@ -106,6 +111,15 @@ def _pushed(rest, rows, work, e):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _missed(rotor, rows, work, e):  # type: ignore[no-untyped-def]
+    """Fill `e` with what the model needs by inverse dynamics and the filtered torque does not give."""
+    for i in range(e.size):
+        e[i] = work[_RIGID, i] + work[_FRICTION, i] - rows[3, i]
+        for j in range(e.size):
+            e[i] += rotor[i, j] * work[_ACCELERATION, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _begin(sample, start, rows, bent):  # type: ignore[no-untyped-def]
     for i in range(rows.shape[1]):
         rows[0, i] = rows[1, i] = sample[0, i]
@@ -114,23 +128,22 @@ def _begin(sample, start, rows, bent):  # type: ignore[no-untyped-def]
         rows[8, i] = rows[9, i] = rows[10, i] = 0.0
         rows[6, i] = np.nan
     for k in range(bent.shape[1]):
-        bent[0, k], bent[1, k] = 0.0, start
+        bent[0, k], bent[1, k], bent[2, k] = 0.0, start, 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _bend(bristles, q, rest, rows, bent):  # type: ignore[no-untyped-def]
     """Bend the bristles by the displacement since the last sample, and what is not known of them with it."""
     for k in range(bristles.size):
-        j, w = bristles[k].joint, bristles[k].shape
-        moved = q[j] - rows[0, j]
+        w = bristles[k].shape
+        moved = turned_by(bristles[k], q) - turned_by(bristles[k], rows[0])
         bent[0, k] = bent_by(moved, w, bent[0, k])
         kept = np.exp(-2.0 * abs(moved) / w)
         bent[1, k] = bent[1, k] * kept + rest[4] * (1.0 - kept)
-        if moved * rows[12, j] < 0.0:
+        if moved * bent[2, k] < 0.0:
             bent[1, k] = max(bent[1, k], rest[3])
-    for j in range(q.size):
-        if q[j] != rows[0, j]:
-            rows[12, j] = 1.0 if q[j] > rows[0, j] else -1.0
+        if moved != 0.0:
+            bent[2, k] = 1.0 if moved > 0.0 else -1.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -140,6 +153,7 @@ def _filtered(bristles, numbers, sample, states, acceleration):  # type: ignore[
     n_v = rows.shape[1]
     f00, f01, f10, f11 = numbers[0], numbers[1], numbers[2], numbers[3]
     a0, a1, b0, b1 = numbers[4], numbers[5], numbers[6], numbers[7]
+    _without_bristles(bristles, sample[1], rows, bent)
     for j in range(n_v):
         q, last = sample[0, j], rows[0, j]
         y, slope = rows[1, j], rows[2, j]
@@ -147,15 +161,23 @@ def _filtered(bristles, numbers, sample, states, acceleration):  # type: ignore[
         rows[2, j] = f10 * y + f11 * slope + a1 * last + b1 * q
         rows[0, j] = q
         acceleration[j] = numbers[8] * (q - rows[1, j]) - numbers[9] * rows[2, j]
-        u = sample[1, j]
-        for k in range(bristles.size):
-            if bristles[k].joint == j:
-                size = rows[11, j] if bristles[k].kind == 17 else 1.0
-                u -= bristles[k].weight * size * bent[0, k]
-        T, slope = rows[3, j], rows[4, j]
+        u, T, slope = rows[12, j], rows[3, j], rows[4, j]
         rows[3, j] = f00 * T + f01 * slope + a0 * rows[5, j] + b0 * u
         rows[4, j] = f10 * T + f11 * slope + a1 * rows[5, j] + b1 * u
         rows[5, j] = u
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _without_bristles(bristles, tau, rows, bent):  # type: ignore[no-untyped-def]
+    """Leave in `rows` what of the torque `tau` (n_v,) bristles do not take; a shared motor's are on both its joints."""
+    for j in range(tau.size):
+        rows[12, j] = tau[j]
+    for k in range(bristles.size):
+        j = bristles[k].joint
+        taken = bristles[k].weight * (rows[11, j] if bristles[k].kind == 17 else 1.0) * bent[0, k]
+        rows[12, j] -= taken
+        if bristles[k].ratio != 0.0:
+            rows[12, bristles[k].other] -= bristles[k].ratio * taken
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -197,7 +219,8 @@ def _disturbance(gains, body, model, rows, torque):  # type: ignore[no-untyped-d
     mass, work = model
     n_v, y = rows.shape[1], work[_RIGID]
     for i in range(n_v):
-        mass[i, i] += rotor[i]
+        for j in range(n_v):
+            mass[i, j] += rotor[i, j]
     for i in range(n_v):
         y[i] = h * (work[_BIAS, i] + work[_FRICTION, i] - rows[3, i])
         for j in range(n_v):
@@ -221,3 +244,5 @@ def _uncertainty(bristles, rms, rows, bent, out):  # type: ignore[no-untyped-def
         j = bristles[k].joint
         size = bristles[k].weight * (rows[11, j] if bristles[k].kind == 17 else 1.0)
         out[1, j] += size * size * bent[1, k]
+        if bristles[k].ratio != 0.0:
+            out[1, bristles[k].other] += (bristles[k].ratio * size) ** 2 * bent[1, k]

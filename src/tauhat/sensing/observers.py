@@ -15,6 +15,7 @@ from tauhat.dynamics.terms.presliding import LENGTHS
 from tauhat.errors import SensingError
 from tauhat.robots.naming import advice_on_name
 from tauhat.sensing import observer_kernel as kernel
+from tauhat.sensing.own_friction import own_friction
 from tauhat.sensing.sensed_model import SensedModel
 
 N_GAINS = 4
@@ -173,36 +174,54 @@ class KalmanObserver(Observer):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ThermalObserver(MomentumObserver):
-    """The momentum observer with the warmth of every joint beside it, and what is not known of friction in the error.
+class FrictionObserver(MomentumObserver):
+    """The momentum observer with a state of every joint's friction beside it, and what is not known of it in the error.
 
-    The warmth runs along, heated by the model's friction; it is corrected by the external torque while nothing touches
-    the arm, and left alone in contact. Its variance widens that of the torque. Needs an estimate with a thermal term.
+    The state is corrected by the external torque while nothing touches the arm and the joint moves, and left alone in
+    contact. Its variance widens that of the torque.
 
-    start, spread : warmth at the first sample and its standard deviation; 1 is what a joint's typical speed would bring
-    wander : standard deviation of the warmth's model, in a long time without correction
+    start, spread : state at the first sample and its standard deviation
+    wander : standard deviation of the state's model, in a long time without correction
     correlation : time over which errors of the model are alike [s]
     limit : standard deviations of external torque within which the arm counts as free
-    hold : how long, before the warmth is corrected [s]
+    hold : how long, before the state is corrected [s]
     """
 
-    key: ClassVar[str] = "thermal"
     kind: ClassVar[int] = kernel.THERMAL
-    start: float = 0.5
-    spread: float = 0.7
-    wander: float = 0.15
+    start: float
+    spread: float
+    wander: float
     correlation: float = 1.0
     limit: float = 3.0
     hold: float = 0.5
 
     def __post_init__(self) -> None:
-        super(ThermalObserver, self).__post_init__()
+        super(FrictionObserver, self).__post_init__()
         for name in ("spread", "wander", "correlation", "limit", "hold"):
             value = getattr(self, name)
             if not 0.0 < value < np.inf:
                 raise SensingError(f"{name} of an observer", where=self.key, expected="above zero", got=value)
         if not np.isfinite(self.start):
             raise SensingError("start of an observer", where=self.key, expected="a number", got=self.start)
+
+    def _settings(self, step: float) -> FloatArray:
+        """Return the settings that `thermal_kernel` reads."""
+        alike = max(1.0, 2.0 * self.correlation / step)
+        settings = [self.start, self.spread**2, self.wander**2, alike, self.limit, self.hold, step, LENGTHS[0]]
+        return read_only(np.array(settings))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ThermalObserver(FrictionObserver):
+    """Friction that warms up: the state is the warmth of the joint, heated by the model's friction.
+
+    Needs an estimate with a thermal term. A warmth of 1 is what a joint's typical speed would bring.
+    """
+
+    key: ClassVar[str] = "thermal"
+    start: float = 0.5
+    spread: float = 0.7
+    wander: float = 0.15
 
     def heat(self, model: SensedModel, step: float) -> HeatPlan:
         """Return what `thermal_kernel` reads.
@@ -218,9 +237,35 @@ class ThermalObserver(MomentumObserver):
                 expected="one with the term thermal",
                 remedy="identify a warm-up recording with --model plain,thermal, or take another observer",
             )  # fmt: skip
-        alike = max(1.0, 2.0 * self.correlation / step)
-        settings = [self.start, self.spread**2, self.wander**2, alike, self.limit, self.hold, step, LENGTHS[0]]
-        return read_only(model.heat.numbers(step)), model.heat.slopes, model.slow, read_only(np.array(settings))
+        return read_only(model.heat.numbers(step)), model.heat.slopes, model.slow, self._settings(step)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RefreshObserver(FrictionObserver):
+    """Friction that changes slowly for reasons nobody knows: the state is the part by which it is larger than fitted.
+
+    For estimates without a thermal term. Dry and viscous friction grow and shrink together; the part fades to `start`
+    with the time constant `time`, and wanders by `wander` meanwhile.
+
+    time : over which friction may have changed [s]
+    """
+
+    key: ClassVar[str] = "refresh"
+    start: float = 0.0
+    spread: float = 0.4
+    wander: float = 0.4
+    time: float = 600.0
+
+    def __post_init__(self) -> None:
+        super(RefreshObserver, self).__post_init__()
+        if not 0.0 < self.time < np.inf:
+            raise SensingError("time of an observer", where=self.key, expected="above zero", got=f"{self.time} s")
+
+    def heat(self, model: SensedModel, step: float) -> HeatPlan:
+        """Return what `thermal_kernel` reads: a state that nothing heats, and the friction it is a part of."""
+        numbers = np.zeros((model.n_v, 5))
+        numbers[:, 0] = np.exp(-step / self.time)
+        return read_only(numbers), own_friction(model), model.slow, self._settings(step)
 
 
 OBSERVERS: Mapping[str, type[Observer]] = {
@@ -233,6 +278,7 @@ OBSERVERS: Mapping[str, type[Observer]] = {
         DisturbanceObserver,
         KalmanObserver,
         ThermalObserver,
+        RefreshObserver,
     )
 }
 """All observers by name; the first is the default."""

@@ -22,7 +22,7 @@ from tauhat.sensing.wrench import WrenchSolver
 Verdict: TypeAlias = Literal["payload", "no payload", "undecided"]
 
 _APART = 0.5  # between samples [s]
-_FEWEST = 6
+FEWEST_SAMPLES = 6
 _SURE = 3.0  # standard errors of a mass that is there
 _LEFT = 0.5  # share that a payload may leave unexplained
 _MOVED = 0.2  # 1 less the square is the cosine between a weight's torques at positions that can be told apart
@@ -75,15 +75,15 @@ def check_payload(
     first, last = (sensed.t[0], sensed.t[-1]) if between is None else between
     rows = np.flatnonzero(sensed.settled & (sensed.t >= first) & (sensed.t <= last))
     rows = rows[:: max(1, round(_APART / sensed.step))]
-    if rows.size < _FEWEST:
+    if rows.size < FEWEST_SAMPLES:
         raise SensingError(
             "too short to tell a payload from a contact", where=sensed.name,
-            expected=f"{_FEWEST * _APART:g} s", got=f"{rows.size * _APART:g} s",
+            expected=f"{FEWEST_SAMPLES * _APART:g} s", got=f"{rows.size * _APART:g} s",
         )  # fmt: skip
     std = sensed.tau_std[rows]
     columns = np.stack([_columns(solver, q) for q in sensed.q[rows]]) / std[:, :, None]
     torque = sensed.tau[rows] / std
-    halves = (np.arange(rows.size) // (_FEWEST // 2)) % 2 == 0
+    halves = (np.arange(rows.size) // (FEWEST_SAMPLES // 2)) % 2 == 0
     unexplained = _left(columns, torque, halves)
     values, errors = _fitted(columns, torque)
     mass, mass_std = float(values[0]), float(errors[0])
@@ -92,6 +92,12 @@ def check_payload(
         verdict=_verdict(columns, mass > _SURE * mass_std and unexplained < _LEFT), mass=mass, mass_std=mass_std,
         centre=centre, unexplained=unexplained,
     )  # fmt: skip
+
+
+def long_enough(sensed: SensedLog, *, between: tuple[float, float]) -> bool:
+    """Return whether `check_payload` can tell anything of the time between two moments [s]."""
+    rows = sensed.settled & (sensed.t >= between[0]) & (sensed.t <= between[1])
+    return bool(np.count_nonzero(rows) > (FEWEST_SAMPLES - 1) * max(1, round(_APART / sensed.step)))
 
 
 def _columns(solver: WrenchSolver, q: FloatArray) -> FloatArray:

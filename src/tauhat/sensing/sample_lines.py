@@ -114,14 +114,24 @@ def _from_json(line: str, robot: Robot) -> Sample | None:
         data = json.loads(line)
     except (ValueError, RecursionError):
         return None
+    return sample_of(data, robot, where="standard input")
+
+
+def sample_of(data: object, robot: Robot, *, where: str) -> Sample | None:
+    """Return the sample that decoded JSON holds, None where it holds none.
+
+    Raises
+    ------
+    SensingError
+        when it names the joints of another robot.
+    """
     if not isinstance(data, dict):
         return None
     names = data.get("joints")
     if names is not None and names != list(robot.joint_names):
         raise SensingError(
-            "samples of another robot", where="standard input", expected=", ".join(robot.joint_names),
-            got=str(names)[:200],
-        )  # fmt: skip
+            "samples of another robot", where=where, expected=", ".join(robot.joint_names), got=str(names)[:200]
+        )
     t, q, tau = _numbers([data.get("t")]), _numbers(data.get("q")), _numbers(data.get("tau"))
     return None if t is None or q is None or tau is None else Sample(t[0], q, tau)
 

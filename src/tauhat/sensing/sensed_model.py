@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tauhat.arrays import FloatArray, frozen, read_only
 from tauhat.control.model_torque import model_torque
 from tauhat.dynamics.base import random_motion
-from tauhat.dynamics.forward import Masses, rotor_mass_matrix
+from tauhat.dynamics.forward import Masses, rotor_mass_matrix, rotor_matrix
 from tauhat.dynamics.passive_kernel import DAHL, ELEMENT, LOAD_DAHL
 from tauhat.dynamics.tree import kernel_tree
 from tauhat.errors import ModelError, SensingError
@@ -22,7 +22,7 @@ from tauhat.sensing.thermal import SensedHeat, parted
 
 _STRENGTH = 100.0
 _STATES, _SEED = 100, 20240229
-_STANDING = 0.02  # rad/s or m/s, in parts of the top speed, below which a joint counts as standing
+STANDING = 0.02  # rad/s or m/s, in parts of the top speed, below which a joint counts as standing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,12 +31,14 @@ class SensedModel:
 
     robot : geometry and gravity
     inertia : (n_v, 10); base parameters do as well
-    rotor : (n_v,) [kg m^2 or kg]
+    rotor : (n_v, n_v) [kg m^2 or kg]; (n_v,) where each motor turns with one joint
     sliding : friction, springs and offsets that follow from speed and position, as `dynamics.passive_kernel` has them
     bristles : friction with a memory of the displacement; its states follow the position as measured
     rms : (n_v,) of the model's error where the joint moves [Nm or N]
     slow : (n_v,) speed below which a joint counts as standing [rad/s or m/s]
     heat : how friction changes with the warmth of the joints; None: it does not
+    stretch : (n_v,) what standard errors of external torque are multiplied with where they are told, one by default;
+        observers themselves go by `rms`
     """
 
     robot: Robot
@@ -47,11 +49,14 @@ class SensedModel:
     rms: FloatArray
     slow: FloatArray
     heat: SensedHeat | None = None
+    stretch: FloatArray = field(default_factory=lambda: np.ones(0))
 
     def __post_init__(self) -> None:
         n_v = self.robot.n_v
-        for name, shape in (("inertia", (n_v, 10)), ("rotor", (n_v,)), ("rms", (n_v,)), ("slow", (n_v,))):
+        object.__setattr__(self, "stretch", self.stretch if np.size(self.stretch) else np.ones(n_v))
+        for name, shape in (("inertia", (n_v, 10)), *((name, (n_v,)) for name in ("rms", "slow", "stretch"))):
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape, where="sensed model"))
+        object.__setattr__(self, "rotor", rotor_matrix(self.rotor, n_v, where="sensed model"))
         for name in ("sliding", "bristles"):
             elements = np.array(getattr(self, name))
             if elements.dtype != ELEMENT:
@@ -59,7 +64,7 @@ class SensedModel:
             object.__setattr__(self, name, read_only(elements))
         if self.heat is not None and len(self.heat.slopes) != n_v:
             raise SensingError("heat of a sensed model", expected=f"{n_v} joints", got=len(self.heat.slopes))
-        if not ((self.rms > 0.0).all() and (self.slow > 0.0).all()):
+        if not all((values > 0.0).all() for values in (self.rms, self.slow, self.stretch)):
             raise SensingError("errors and slow speeds of a model", expected="above zero", got=self.rms.tolist())
 
     @property
@@ -117,7 +122,7 @@ def sensed_model(estimate: Estimate) -> SensedModel:
     Raises
     ------
     ModelError
-        when a term has no value at a single state: gas springs and motors that turn with two joints.
+        when a term has no value at a single state: friction that changes with a measured temperature.
     """
     parts = parted(estimate)
     torque = model_torque(parts.model, parts.standard)
@@ -130,6 +135,6 @@ def sensed_model(estimate: Estimate) -> SensedModel:
         sliding=torque.elements[~remembered],
         bristles=torque.elements[remembered],
         rms=np.maximum(estimate.joint_rms, np.finfo(float).tiny),
-        slow=_STANDING * np.maximum(tops, np.finfo(float).tiny),
+        slow=STANDING * np.maximum(tops, np.finfo(float).tiny),
         heat=parts.heat,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -17,11 +17,12 @@ from tauhat.robots.fitting import check_joint_order
 from tauhat.sensing import sensor_kernel as kernel
 from tauhat.sensing import stamp_kernel as stamp
 from tauhat.sensing.causal_filter import CausalFilter
-from tauhat.sensing.observer_kernel import DISTURBANCE
+from tauhat.sensing.observer_kernel import DISTURBANCE, THERMAL
 from tauhat.sensing.observers import MomentumObserver, Observer
 from tauhat.sensing.sensed_log import SampleCounts, SensedLog
 from tauhat.sensing.sensed_model import SensedModel, sensed_model
-from tauhat.sensing.torque_observer import TorqueObserver
+from tauhat.sensing.thermal_kernel import VARIANCE, WARMTH
+from tauhat.sensing.torque_observer import SensedWarmth, TorqueObserver
 from tauhat.sensing.wrench import WrenchSolver
 
 Stamps: TypeAlias = Literal["auto", "exact", "jittered"]
@@ -33,6 +34,7 @@ OFF_RATE = 0.05  # a clock further off than this is another one
 _OF_RATE = 0.45  # the highest cut-off in parts of the rate
 _BRIDGED_STEPS, _BRIDGED = 5.0, 0.02  # lost samples are put back over so many steps, or so long [s]
 _CHUNK = 2**16  # [samples] between which Python may be interrupted
+_NO_LAG = read_only(np.zeros(1))
 _HALF = 0.5  # period that a stamp may be late
 _ORDINARY = 0.25  # of the median: two steps further off hold a lost sample, or one that is late
 
@@ -47,6 +49,7 @@ class Sensed(NamedTuple):
     wrench : (6,) force, then moment, at the frame [N, Nm]
     covariance : (6, 6) of the wrench
     settled : whether the last start is forgotten
+    lag : (n_v,) what the torque changed by within the observer's delay; the covariance holds it [Nm or N]
     """
 
     tau: FloatArray
@@ -57,6 +60,7 @@ class Sensed(NamedTuple):
     wrench: FloatArray
     covariance: FloatArray
     settled: bool = True
+    lag: FloatArray = _NO_LAG
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -90,7 +94,7 @@ class ForceSensor:
             raise SensingError("delay of a channel", expected="below 1 s", got=f"{self.delay} s")
         if self.stamps not in STAMPS:
             raise SensingError("time stamps", expected=", ".join(STAMPS), got=str(self.stamps)[:60])
-        solver = self.wrench or WrenchSolver(robot=self.model.robot)
+        solver = self.solver
         if solver.robot.fingerprint != self.model.robot.fingerprint:
             raise SensingError("the wrench is of another robot", expected=self.model.robot.name, got=solver.robot.name)
         cutoff = min(CUTOFF, _OF_RATE * self.rate) if self.cutoff is None else self.cutoff
@@ -111,6 +115,11 @@ class ForceSensor:
     def n_v(self) -> int:
         """Number of joints."""
         return self.model.n_v
+
+    @property
+    def solver(self) -> WrenchSolver:
+        """Of the wrench."""
+        return self.wrench or WrenchSolver(robot=self.model.robot)
 
     @property
     def longest_bridged(self) -> float:
@@ -174,9 +183,9 @@ class ForceSensor:
             raise self._no_body()
         if code > stamp.RESTARTED:
             return state, None, code
-        tau, variance, q, dq, raw, _ = out[0]
+        tau, variance, q, dq, raw, lag = out[0]
         settled = kernel.behind_start(self._machine[3][0][1] * state[stamp.AGE]) < kernel.SETTLED
-        return state, Sensed(tau, variance, q, dq, raw, out[1][0], out[1][1:], bool(settled)), code
+        return state, Sensed(tau, variance, q, dq, raw, out[1][0], out[1][1:], bool(settled), lag), code
 
     def along(self, log: Recording | Log) -> SensedLog:
         """Return what is sensed along a log; causal: a sample knows none after it.
@@ -188,23 +197,53 @@ class ForceSensor:
         SensingError
             when the log is of another robot or rate, or has no torque; or the mass matrix is needed and of no body.
         """
+        codes, results = np.empty(log.n_t, dtype=np.intp), _results(log.n_t, self.n_v)
+        windows = self._windows(log, range(0, log.n_t, _CHUNK), results, codes)
+        filled = max((taken for _, taken in windows), default=0)
+        return self._sensed(log, codes, tuple(result[:filled] for result in results))
+
+    def warmth(self, memory: FloatArray) -> SensedWarmth:
+        """Return the warmth of the joints behind a sample; nan by an observer that follows none."""
+        rows = kernel.split(memory.copy(), self.n_v, self.model.bristles.size)[2]
+        return SensedWarmth(rows[WARMTH].copy(), rows[VARIANCE].copy())
+
+    def warmth_along(self, log: Recording | Log, *, points: int = 1000) -> tuple[FloatArray, SensedWarmth]:
+        """Return times (n,) and the warmth of the joints there, (n, n_v), at about so many places along a log.
+
+        Raises
+        ------
+        SensingError
+            as `along`, and when the observer follows no warmth.
+        """
+        if self.observer.kind != THERMAL:
+            raise SensingError("the observer follows no warmth", expected="thermal", got=self.observer.key)
+        codes, results = np.empty(log.n_t, dtype=np.intp), _results(log.n_t, self.n_v)
+        starts = range(0, log.n_t, max(1, min(_CHUNK, log.n_t // points)))
+        told = [self.warmth(state) for state, _ in self._windows(log, starts, results, codes)]
+        last = np.array([*starts[1:], log.n_t]) - 1
+        kept = np.flatnonzero(codes[last] <= stamp.RESTARTED)
+        theta, variance = (np.stack(part)[kept] for part in zip(*told, strict=True))
+        return np.array(log.t[last[kept]]), SensedWarmth(theta, variance)
+
+    def _windows(
+        self, log: Recording | Log, starts: range, results: tuple[Any, ...], codes: IntArray
+    ) -> Iterator[tuple[FloatArray, int]]:
+        """Fill results and codes window by window; yield the memory behind each, and how many samples were taken."""
         torque = _torque(self.model, log)
         self._check_rate(log)
-        state, codes = self.start().copy(), np.empty(log.n_t, dtype=np.intp)
-        results = _results(log.n_t, self.n_v)
-        filled = 0
-        for first in range(0, log.n_t, _CHUNK):
-            window = slice(first, first + _CHUNK)
+        state, filled = self.start().copy(), 0
+        for first in starts:
+            window = slice(first, first + starts.step)
             samples = tuple(np.array(part[window], dtype=np.float64, order="C") for part in (log.t, log.q, torque))
             rest = tuple(result[filled:] for result in results)
             count = kernel.take_all(self._machine, samples, state, rest, codes[window])
             if count < 0:
                 raise self._no_body()
             filled += count
-        return self._sensed(log, codes, tuple(result[:filled] for result in results))
+            yield state, filled
 
     def _sensed(self, log: Recording | Log, codes: IntArray, results: tuple[Any, ...]) -> SensedLog:
-        solver = self.wrench or WrenchSolver(robot=self.model.robot)
+        solver = self.solver
         rows = np.flatnonzero(codes <= stamp.RESTARTED)
         if not rows.size:
             raise SensingError("no sample of the log can be used", where=log.name, got=f"{log.n_t} samples")

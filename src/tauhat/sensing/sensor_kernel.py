@@ -14,7 +14,7 @@ position, read linearly.
 
 The observer is late by T behind the filter, the wrench has to be solved where the arm was then:
     y_T+ = k y_T + (1 - k) y,   tau_T+ = k tau_T + (1 - k) tau_ext,   k = exp(-h / T)
-    J at y_T; variance of the torque, for the wrench alone, plus (tau_ext - tau_T)^2
+    J at y_T; variance of the torque, for the wrench alone, plus (tau_ext - tau_T)^2, each joint's own
 For a constant wrench LP(J'w) = LP(J)'w, so J at y_T is right to first order of the way in T. The other term is what the
 torque changed by in T: a wrench that changes is late by that much.
 
@@ -22,9 +22,9 @@ Behind a start nobody knows the velocity, and the filter takes it for zero. The 
 largest torque F and falls as observer and filter forget,
     variance += (F (1 + l age) exp(-l age))^2,    l the slower of their rates.
 
-`machine` is body and plan as `observe` has them, the task (links, place, directions, spread, turned) of a WrenchSolver,
-and limits: numbers (h, l, delay, longest, way of `stamp_kernel`, k) and F (n_v,). `out` is (OUT, n_v): the observer's
-five rows, position y_T in place of y, and tau_ext - tau_T; and (7, 6), wrench and covariance.
+`machine` is body and plan as `observe` has them, the task (links, place, directions, spread, turned, correlation) of a
+WrenchSolver, and limits: numbers (h, l, delay, longest, way of `stamp_kernel`, k) and F (n_v,). `out` is (OUT, n_v):
+the observer's five rows, position y_T in place of y, and tau_ext - tau_T; and (7, 6), wrench and covariance.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _TURN = 2.0 * np.pi
 
 def size_of(n_v: int, n_bent: int, n_ring: int) -> int:
     """Return how many numbers a memory holds."""
-    return CLOCK + STEPS + (2 + ROWS + JUDGED + 2 + OUT + n_ring) * n_v + 2 * n_bent
+    return CLOCK + STEPS + (2 + ROWS + JUDGED + 2 + OUT + n_ring) * n_v + 3 * n_bent
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -68,14 +68,14 @@ def split(state, n_v, n_bent):  # type: ignore[no-untyped-def]
     a = CLOCK + STEPS
     b = a + 2 * n_v
     c = b + ROWS * n_v
-    d = c + 2 * n_bent
+    d = c + 3 * n_bent
     e = d + JUDGED * n_v
     f = e + 2 * n_v
     g = f + OUT * n_v
     stamps = state[d:e].reshape(JUDGED, n_v), state[CLOCK:a].reshape(2, 2)
     said = state[e:f].reshape(2, n_v), state[f:g].reshape(OUT, n_v)
     return (
-        state[:CLOCK], state[a:b].reshape(2, n_v), state[b:c].reshape(ROWS, n_v), state[c:d].reshape(2, n_bent),
+        state[:CLOCK], state[a:b].reshape(2, n_v), state[b:c].reshape(ROWS, n_v), state[c:d].reshape(3, n_bent),
         state[g:].reshape((state.size - g) // n_v, n_v), stamps, said,
     )  # fmt: skip
 
@@ -88,9 +88,9 @@ def scratch(n_v, k):  # type: ignore[no-untyped-def]
         np.empty(40 * (n_v + 1)),
         np.empty((6, n_v)),
         np.empty((6, k)),
-        np.empty((k, k + n_v)),
+        (np.empty((k, k)), np.empty((k + 1, n_v)), np.empty((n_v, n_v))),
         np.empty((1 + k, k)),
-        np.empty((2, n_v)),
+        np.empty((3, n_v)),
     )
     return observing, solving, np.empty((2, n_v))
 
@@ -204,7 +204,7 @@ def _delay(delay, clock, ring, sample):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def _wrench(task, out, work):  # type: ignore[no-untyped-def]
     """Fill the wrench and its covariance from the external torque, at the position to which it belongs."""
-    links, place, directions, spread, turned = task
+    links, place, directions, spread, turned, correlation = task
     links_work, jacobian, along, solving, solved, torque = work
     n_v = jacobian.shape[1]
     jacobian_kernel(links, place, out[0][2], links_work, jacobian)
@@ -213,8 +213,8 @@ def _wrench(task, out, work):  # type: ignore[no-untyped-def]
     else:
         along[:] = directions
     for j in range(n_v):
-        torque[0, j], torque[1, j] = out[0][0, j], out[0][1, j] + out[0][5, j] * out[0][5, j]
-    wrench_kernel(jacobian, (along, spread), torque, solving, solved)
+        torque[0, j], torque[1, j], torque[2, j] = out[0][0, j], out[0][1, j], out[0][5, j] * out[0][5, j]
+    wrench_kernel(jacobian, (along, spread, correlation), torque, solving, solved)
     _six(directions, solved, along, out[1])
 
 

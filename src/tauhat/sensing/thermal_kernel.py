@@ -13,6 +13,9 @@ Over a gap t the arm may have stood or run, as before a start: k = exp(-t / T), 
 On an arm that is free e is `-g (true theta - theta)` and the model's error. This error is alike over about a second: c,
 twice that time over the step, makes the samples of it count as one. An e beyond `limit` deviations counts as that many.
 
+Where nobody knows what changes friction (observer `refresh`), Hd and Hv are that friction itself and theta the part by
+which it is larger; nothing heats it, p = 0.
+
 `heat` is numbers (n_v, 5) of `dynamics.thermal_kernel`, slopes Hd, Hv (n_v, 2), slow speeds (n_v,), and the settings:
 theta and P at the start, wander^2, c, limit, hold [s], h, length of the Dahl state. `rows` is the observer's memory, of
 which 13 theta, 14 P, 15 z, 16 time since the last contact [s], 18-20 filter(Hd z), its slope and what went into the

@@ -40,7 +40,7 @@ class BristleDoubt:
 
 
 class ObserverMemory(NamedTuple):
-    """What an observer remembers between samples: joint by joint (ROWS, n_v), and states of bristles (2, n)."""
+    """What an observer remembers between samples: joint by joint (ROWS, n_v), and states of bristles (3, n)."""
 
     rows: FloatArray
     bent: FloatArray
@@ -65,7 +65,8 @@ class SensedTorque(NamedTuple):
 class SensedWarmth(NamedTuple):
     """Warmth of the joints of one sample or of many, (n_v,) or (n_t, n_v), and its variance.
 
-    Zero where the fitted recording began, one what a joint's typical speed would bring (`dynamics.thermal_kernel`).
+    Zero where the fitted recording began, one what a joint's typical speed would bring (`dynamics.thermal_kernel`); by
+    the observer `refresh` the part by which friction is larger than fitted.
     """
 
     theta: FloatArray
@@ -96,9 +97,9 @@ class TorqueObserver:
         doubt = self.doubt
         rest = read_only(np.array([self.observer.kind, self.step, doubt.start, doubt.turned, doubt.slid]))
         object.__setattr__(self, "_body", self.model.body())
-        object.__setattr__(
-            self, "_plan", (numbers, gains, self.model.rms, rest, self.observer.heat(self.model, self.step))
-        )
+        errors = read_only(np.stack([self.model.rms, self.model.stretch]))
+        heat = self.observer.heat(self.model, self.step)
+        object.__setattr__(self, "_plan", (numbers, gains, errors, rest, heat))
 
     @property
     def n_v(self) -> int:
@@ -112,7 +113,7 @@ class TorqueObserver:
 
     def start(self) -> ObserverMemory:
         """Return the memory before the first sample."""
-        return ObserverMemory(np.full((ROWS, self.n_v), np.nan), np.zeros((2, self.model.bristles.size)))
+        return ObserverMemory(np.full((ROWS, self.n_v), np.nan), np.zeros((3, self.model.bristles.size)))
 
     def advance(
         self, memory: ObserverMemory, q: FloatArray, tau: FloatArray, *, free: bool | None = None

@@ -79,6 +79,9 @@ class WrenchSolver:
     axes : whose axes directions and results are along
     largest : conceivable force and moment, as standard deviations [N, Nm]: where joints cannot tell, the answer is
         zero plus or minus this; raise it for arms that push with more than twice as much
+    correlation : (n_v, n_v) of the joints' errors, as free motion teaches it; none by default
+    sizes : (k,) conceivable sizes of the single directions, where more is known than `largest` says; a friction that
+        cannot be more than a few newtons is then not blown up by errors of the joints [N, Nm]
     """
 
     robot: Robot
@@ -86,6 +89,8 @@ class WrenchSolver:
     directions: FloatArray = field(default_factory=lambda: DIRECTIONS["wrench"])
     axes: Axes = "base"
     largest: tuple[float, float] = (300.0, 60.0)
+    correlation: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    sizes: FloatArray = field(default_factory=lambda: np.zeros(0))
     _links: NDArray[np.void] = field(init=False, repr=False)
     _place: tuple[Any, ...] = field(init=False, repr=False)
     _spread: FloatArray = field(init=False, repr=False)
@@ -102,18 +107,19 @@ class WrenchSolver:
             raise SensingError(
                 "axes and largest wrench", expected="base or frame, two sizes above zero", got=(self.axes, self.largest)
             )
+        object.__setattr__(self, "correlation", _correlation(self.correlation, self.robot.n_v))
         name = self.robot.frames[-1].name if self.frame is None and self.robot.frames else self.frame
         place = named_frame(self.robot, name or self.robot.joint_names[-1])
         object.__setattr__(self, "frame", place.name)
         object.__setattr__(self, "_links", kernel_tree(self.robot).links)
         object.__setattr__(self, "_place", (place.joint, np.array(place.rotation), np.array(place.translation)))
-        sizes = np.repeat(self.largest, 3)
-        object.__setattr__(self, "_spread", read_only(1.0 / np.linalg.norm(directions / sizes[:, None], axis=0)))
+        usual = 1.0 / np.linalg.norm(directions / np.repeat(self.largest, 3)[:, None], axis=0)
+        object.__setattr__(self, "_spread", _spread(self.sizes, usual))
 
     @property
     def task(self) -> tuple[Any, ...]:
-        """Links, place, directions, largest wrench and whether directions turn with the frame, for kernels."""
-        return self._links, self._place, self.directions, self._spread, self.axes == "frame"
+        """Links, place, directions, largest wrench, whether directions turn with the frame, and correlation."""
+        return self._links, self._place, self.directions, self._spread, self.axes == "frame", self.correlation
 
     def jacobian(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the Jacobian of the frame's origin in base axes, (6, n_v), and the frame's rotation, (3, 3)."""
@@ -132,20 +138,26 @@ class WrenchSolver:
         single = self.along(*(np.asarray(value)[None] for value in (q, tau, variance)))
         return SensedWrench(single.wrench[0], single.covariance[0])
 
-    def along(self, q: FloatArray, tau: FloatArray, variance: FloatArray) -> SensedWrench:
+    def along(
+        self, q: FloatArray, tau: FloatArray, variance: FloatArray, *, own: FloatArray | None = None
+    ) -> SensedWrench:
         """Return what acts along positions, one by one.
 
         Parameters
         ----------
-        q, tau, variance : (n_t, n_v)
+        q, tau, variance : (n_t, n_v) position, external torque, and the variance of errors that belong together
+        own : (n_t, n_v) variance of what each joint is wrong by beside them; none by default
         """
         n_v = self.robot.n_v
         rows = [frozen(name, value, (None, n_v), where="wrench") for name, value in (("q", q), ("tau", tau))]
         spread = frozen("variance", variance, rows[0].shape, where="wrench")
         if not (spread > 0.0).all():
             raise SensingError("variance of external torque", expected="above zero", got=float(spread.min()))
+        beside = np.zeros(spread.shape) if own is None else frozen("own", own, spread.shape, where="wrench")
+        if not (beside >= 0.0).all():
+            raise SensingError("own variance of external torque", expected="not negative", got=float(beside.min()))
         solved = np.empty((len(rows[0]), 1 + self._spread.size, self._spread.size))
-        _along(self.task, rows[0], (rows[1], spread), solved)
+        _along(self.task, rows[0], (rows[1], spread, beside), solved)
         wrench = solved[:, 0] @ self.directions.T
         covariance = self.directions @ solved[:, 1:] @ self.directions.T
         return SensedWrench(wrench, covariance)
@@ -162,19 +174,44 @@ class WrenchSolver:
         return np.asarray(axes[:, shares > _HIDDEN])
 
 
+def _spread(sizes: FloatArray, usual: FloatArray) -> FloatArray:
+    """Return conceivable sizes of all directions, (k,): the usual ones where none are given."""
+    if not np.size(sizes):
+        return np.asarray(read_only(usual))
+    given = frozen("sizes", sizes, usual.shape, where="wrench")
+    if not (given > 0.0).all():
+        raise SensingError("conceivable sizes of directions", expected="above zero", got=given.tolist())
+    return given
+
+
+def _correlation(values: FloatArray, n_v: int) -> FloatArray:
+    """Return a correlation of the joints' errors, (n_v, n_v), after refusing what is none; empty: that of none."""
+    if not np.size(values):
+        return np.asarray(read_only(np.eye(n_v)))
+    matrix = frozen("correlation", values, (n_v, n_v), where="wrench")
+    alike = np.abs(matrix - matrix.T).max() < _UNIT and np.abs(matrix.diagonal() - 1.0).max() < _UNIT
+    if not alike or np.linalg.eigvalsh(matrix)[0] <= 0.0:
+        raise SensingError(
+            "correlation of the joints' errors", expected="symmetric, ones on the diagonal, positive definite",
+            got=matrix.tolist(),
+        )  # fmt: skip
+    return matrix
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _along(task, q, torque, out):  # type: ignore[no-untyped-def]
-    links, place, directions, spread, turned = task
+    links, place, directions, spread, turned, correlation = task
     n_t, n_v = q.shape
     links_work, jacobian = np.empty(40 * (n_v + 1)), np.empty((6, n_v))
-    work, inputs = np.empty((spread.size, spread.size + n_v)), np.empty((2, n_v))
+    k_all, inputs = spread.size, np.empty((3, n_v))
+    work = np.empty((k_all, k_all)), np.empty((k_all + 1, n_v)), np.empty((n_v, n_v))
     along = directions.copy()
     for k in range(n_t):
         jacobian_kernel(links, place, q[k], links_work, jacobian)
         if turned:
             turn_directions(directions, links_work[40 * n_v :], along)
-        inputs[0], inputs[1] = torque[0][k], torque[1][k]
-        wrench_kernel(jacobian, (along, spread), inputs, work, out[k])
+        inputs[0], inputs[1], inputs[2] = torque[0][k], torque[1][k], torque[2][k]
+        wrench_kernel(jacobian, (along, spread, correlation), inputs, work, out[k])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -2,8 +2,10 @@
 
     tau_ext = J' D x + error,   error ~ (0, V),   x ~ (0, S)        w = D x
     A = D'J V^-1 J'D + S^-1     x = A^-1 D'J V^-1 tau     cov x = A^-1
-D holds the directions that are asked for, (6, k) in base axes; V is diagonal; S is what is taken as the largest
-conceivable wrench. Where the joints tell x it has no say; where they cannot, x stays small, with the variance of S.
+D holds the directions that are asked for, (6, k) in base axes; S is what is taken as the largest conceivable wrench.
+Where the joints tell x it has no say; where they cannot, x stays small, with the variance of S. Errors of the joints
+belong together as the correlation R says; beside them each joint may have an error of its own:
+    V = diag(std) R diag(std) + diag(own)        V = L L',  L^-1 J'D and L^-1 tau have errors that are alike and apart
 
 `place` is the frame: joint, rotation (3, 3) and translation (3,) in that joint's frame. Rows of J are the velocity of
 the frame's origin, then its angular velocity, in base axes. `work` is scratch, 40 numbers a joint: 0-8 R, 9-11 P as
@@ -80,26 +82,25 @@ def _column(link, work, o, end, column):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def wrench_kernel(jacobian, wanted, torque, work, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (1 + k, k) with x and its covariance; `torque` is tau and its variance, (2, n_v).
+    """Fill `out` (1 + k, k) with x and its covariance; `torque` (3, n_v) is tau, its variance, and each joint's own.
 
-    `wanted` are D (6, k) in base axes and the standard deviations of S (k,); `work` (k, k + n_v) is scratch.
+    `wanted` are D (6, k) in base axes, the standard deviations of S (k,), and R (n_v, n_v); scratch is `work`: (k, k),
+    (k + 1, n_v), (n_v, n_v).
     """
-    directions, spread = wanted
+    directions, spread, correlation = wanted
+    normal, seen, joint = work
     k_all, n_v = spread.size, jacobian.shape[1]
-    normal, seen = work[:, :k_all], work[:, k_all:]
-    for a in range(k_all):
-        for j in range(n_v):
-            seen[a, j] = 0.0
-            for r in range(6):
-                seen[a, j] += directions[r, a] * jacobian[r, j]
+    _joint_covariance(correlation, torque, joint)
+    _factor(joint)
+    _seen_alike(jacobian, directions, torque[0], joint, seen)
     for a in range(k_all):
         out[0, a] = 0.0
         for j in range(n_v):
-            out[0, a] += seen[a, j] * torque[0, j] / torque[1, j]
+            out[0, a] += seen[a, j] * seen[k_all, j]
         for b in range(a + 1):
             entry = 0.0
             for j in range(n_v):
-                entry += seen[a, j] * seen[b, j] / torque[1, j]
+                entry += seen[a, j] * seen[b, j]
             normal[a, b] = normal[b, a] = entry
         normal[a, a] += 1.0 / (spread[a] * spread[a])
     _factor(normal)
@@ -112,8 +113,44 @@ def wrench_kernel(jacobian, wanted, torque, work, out):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _seen_alike(jacobian, directions, tau, lower, seen):  # type: ignore[no-untyped-def]
+    """Fill `seen` (k + 1, n_v) with the rows of L^-1 J'D, and L^-1 tau behind them."""
+    k_all, n_v = directions.shape[1], tau.size
+    for a in range(k_all):
+        for j in range(n_v):
+            seen[a, j] = 0.0
+            for r in range(6):
+                seen[a, j] += directions[r, a] * jacobian[r, j]
+    for j in range(n_v):
+        seen[k_all, j] = tau[j]
+    for a in range(k_all + 1):
+        _solved_lower(lower, seen[a])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _joint_covariance(correlation, torque, out):  # type: ignore[no-untyped-def]
+    """Fill the lower triangle of `out` with V."""
+    for i in range(out.shape[0]):
+        for j in range(i):
+            out[i, j] = 0.0
+            if correlation[i, j] != 0.0:
+                out[i, j] = correlation[i, j] * np.sqrt(torque[1, i] * torque[1, j])
+        out[i, i] = torque[1, i] + torque[2, i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
+def _solved_lower(lower, values):  # type: ignore[no-untyped-def]
+    """Overwrite `values` with what a lower triangle makes them of."""
+    for i in range(values.size):
+        rest = values[i]
+        for j in range(i):
+            rest -= lower[i, j] * values[j]
+        values[i] = rest / lower[i, i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})
 def _factor(matrix):  # type: ignore[no-untyped-def]
-    """Overwrite the lower triangle with the Cholesky factor; the prior keeps the matrix positive definite."""
+    """Overwrite the lower triangle of a positive definite matrix with its Cholesky factor."""
     n = matrix.shape[0]
     for i in range(n):
         for j in range(i):

@@ -17,6 +17,12 @@ from tauhat.sensing.sensed_log import SensedLog
 from tauhat.sensing.wrench import WrenchSolver
 
 _FEWEST = 2
+_SAME_PLACE = 0.05  # [rad or m] to which two passes of a motion agree
+_ELSEWHERE = 0.05  # share of the samples that may be further apart
+_APART = 5.0  # [s] that the logs of two passes may begin apart
+_COARSE, _FINE = 0.02, 41  # step of the search for that time [s], and places within it
+_COMPARED = 2000  # samples by which it is found
+_CHUNK = 2**16  # samples
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,11 +60,13 @@ class AirPass:
     progress : (n,) increasing; time since the motion began, or length of path
     torque : (n, n_v) [Nm or N]
     wrench : (n, 6) [N, Nm]
+    q : (n, n_v) where the arm was, to tell other motions [rad or m]; None: nobody checks
     """
 
     progress: FloatArray
     torque: FloatArray
     wrench: FloatArray
+    q: FloatArray | None = None
 
     def __post_init__(self) -> None:
         progress = frozen("progress", self.progress, (None,), where="pass in air")
@@ -66,6 +74,8 @@ class AirPass:
         for name, columns in (("torque", None), ("wrench", 6)):
             value = frozen(name, getattr(self, name), (progress.size, columns), where="pass in air")
             object.__setattr__(self, name, value)
+        if self.q is not None:
+            object.__setattr__(self, "q", frozen("q", self.q, self.torque.shape, where="pass in air"))
         if progress.size < _FEWEST or (np.diff(progress) <= 0.0).any():
             raise SensingError("progress of a pass in air", expected=f"{_FEWEST} or more, increasing")
 
@@ -92,7 +102,38 @@ def air_pass(sensed: SensedLog, *, progress: FloatArray | None = None) -> AirPas
     """
     along = sensed.t - sensed.t[0] if progress is None else frozen("progress", progress, (sensed.n_t,))
     kept = sensed.settled
-    return AirPass(progress=along[kept], torque=sensed.tau[kept], wrench=sensed.wrench[kept])
+    return AirPass(progress=along[kept], torque=sensed.tau[kept], wrench=sensed.wrench[kept], q=sensed.q[kept])
+
+
+def without_air(sensed: SensedLog, air: AirPass, *, solver: WrenchSolver) -> SensedLog:
+    """Return what was sensed less a pass in air of the same motion, by the time at which the positions fit.
+
+    The two logs may begin up to five seconds apart, and one may be longer. Samples where the arm is elsewhere than in
+    the pass, or than it ended, are no longer `settled`: nothing is known of them.
+
+    Parameters
+    ----------
+    air : by time, with its positions
+
+    Raises
+    ------
+    SensingError
+        when the motions differ: more than a twentieth of the samples within the pass more than 0.05 rad or m apart.
+    """
+    since = sensed.t - sensed.t[0]
+    progress = since + _shift(since, sensed, air)
+    apart = np.abs(sensed.q - _at(air.progress, _positions(air), progress)).max(axis=1)
+    elsewhere = sensed.settled & (apart > _SAME_PLACE)
+    during = sensed.settled & (progress >= air.progress[0]) & (progress <= air.progress[-1])
+    share = float((elsewhere & during).sum() / max(1.0, float(during.sum())))
+    if share > _ELSEWHERE:
+        raise SensingError(
+            "not the motion of the pass in air", where=sensed.name,
+            expected=f"positions within {_SAME_PLACE:g} rad or m, logs that begin within {_APART:g} s of each other",
+            got=f"{100.0 * share:.0f} % of the samples within the pass elsewhere", remedy="log the same motion in air",
+        )  # fmt: skip
+    found = zeroed(sensed, air.torque_at(progress), solver=solver)
+    return replace(found, settled=sensed.settled & ~elsewhere)
 
 
 def zeroed(sensed: SensedLog, zero: FloatArray, *, solver: WrenchSolver) -> SensedLog:
@@ -109,8 +150,32 @@ def zeroed(sensed: SensedLog, zero: FloatArray, *, solver: WrenchSolver) -> Sens
         when the zero has another shape.
     """
     tau = sensed.tau - frozen("zero", zero, sensed.tau.shape, where=sensed.name)
-    found = solver.along(sensed.q, tau, np.square(sensed.tau_std) + np.square(sensed.lag))
-    return replace(sensed, tau=tau, wrench=found.wrench, wrench_std=found.standard_errors, frame=str(solver.frame))
+    wrench, errors = np.empty((sensed.n_t, 6)), np.empty((sensed.n_t, 6))
+    for first in range(0, sensed.n_t, _CHUNK):  # covariances take 36 numbers a sample
+        window = slice(first, first + _CHUNK)
+        variance, own = np.square(sensed.tau_std[window]), np.square(sensed.lag[window])
+        found = solver.along(sensed.q[window], tau[window], variance, own=own)
+        wrench[window], errors[window] = found.wrench, found.standard_errors
+    return replace(sensed, tau=tau, wrench=wrench, wrench_std=errors, frame=str(solver.frame))
+
+
+def _shift(since: FloatArray, sensed: SensedLog, air: AirPass) -> float:
+    """Return how much later in the pass the positions of a log fit best [s]."""
+    rows = np.unique(np.linspace(0, sensed.n_t - 1, _COMPARED).astype(np.intp))
+    q, places = sensed.q[rows], _positions(air)
+
+    def best(shifts: FloatArray) -> float:
+        apart = [np.square(q - _at(air.progress, places, since[rows] + shift)).mean() for shift in shifts]
+        return float(shifts[int(np.argmin(apart))])
+
+    coarse = best(np.arange(-_APART, _APART + _COARSE, _COARSE))
+    return best(np.linspace(coarse - _COARSE, coarse + _COARSE, _FINE))
+
+
+def _positions(air: AirPass) -> FloatArray:
+    if air.q is None:
+        raise SensingError("a pass in air without positions", remedy="make it with air_pass")
+    return air.q
 
 
 def _at(progress: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:

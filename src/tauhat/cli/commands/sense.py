@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,13 +12,15 @@ import typer
 from tauhat.cli.options import EstimateArgument, JsonOption, MapOption, RowsOption, frequency, page
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
+from tauhat.cli.zero_choice import ZeroChoice, zero_choice
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tauhat.cli.contact_choice import ContactChoice
+    from tauhat.cli.contact_choice import ContactChoice, Prepared
     from tauhat.recordings.log import Log
-    from tauhat.sensing.sensed_log import SensedLog
+    from tauhat.sensing.judged_log import JudgedLog
+    from tauhat.sensing.sensor import ForceSensor
 
 _STANDARD_INPUT = "-"
 
@@ -83,20 +85,29 @@ class Options:
         list[Path] | None,
         typer.Option(
             "--free", metavar="LOG", show_default=False, readable=False,
-            help="A recording without contact, to learn from when something touches the arm; may be repeated.",
+            help="A recording without contact, of any rate, to learn from how large errors are and when something "
+            "touches the arm; may be repeated.",
         ),
     ] = None  # fmt: skip
     thresholds: Annotated[
         Path | None,
         typer.Option(
             "--thresholds", metavar="FILE.json", show_default=False,
-            help="Thresholds of contact to read; with --free, to write.",
+            help="What --free has taught, error bars and thresholds of contact, to read; with --free, to write.",
         ),
     ] = None  # fmt: skip
     alarms: Annotated[
         float,
         typer.Option("--alarms", metavar="RATE", parser=frequency, help="False contacts an hour allowed, with --free."),
     ] = 1.0
+    zero: Annotated[
+        ZeroChoice | None,
+        typer.Option(
+            "--zero", metavar="ZERO", parser=zero_choice, show_default="off what contacts are told by alone",
+            help="What is taken off: standing[:SECONDS[:FOLLOW]], what friction holds as the arm comes to rest; "
+            "air:LOG, the same motion without contact; none.",
+        ),
+    ] = None  # fmt: skip
     map_file: MapOption = None
     rows: RowsOption = None
     report: Annotated[
@@ -122,9 +133,7 @@ class Options:
 
 def run(options: Options) -> None:
     """Sense external torque and wrench with error bars, along logs or on samples as they come."""
-    from tauhat.cli.contact_choice import found_contacts
     from tauhat.cli.sensor_choice import SensorChoice
-    from tauhat.cli.views.contacts import contacts_view
 
     choice = SensorChoice(
         estimate=options.estimate, observer=options.observer, gain=options.gain, cutoff=options.cutoff,
@@ -132,37 +141,45 @@ def run(options: Options) -> None:
         stamps=options.stamps,
     )  # fmt: skip
     if options.stream is not None:
-        from tauhat.cli.sensing_lines import answer
-
-        sensor = choice.sensor(_streamed_rate(options))
-        answer(sensor, _contacts(options).limits(sensor) if options.free or options.thresholds else None)
+        _answer(choice.sensor(_streamed_rate(options)), options)
         return
     if not options.logs:
         raise typer.BadParameter("a LOG, or --input - for samples from standard input")
     _check_outputs(options)
     with working("sensing"):
         logs = _logs(options)
-        sensed = [_sensed(choice, log, options.rate) for log in logs]
-        limits = _contacts(options).limits(choice.sensor(1.0 / sensed[0].step))
-        contacts = found_contacts(limits, sensed)
-    _write(sensed, logs, options)
-    events = [{"log": log, **event.to_dict()} for log, event in contacts]
+        rates = [_rate(log) if options.rate is None else options.rate for log in logs]
+        known = _contacts(options).prepared(choice.sensor(min(rates)))
+        judged = [_judged(known, log, rate, options) for log, rate in zip(logs, rates, strict=True)]
+    _write(judged, logs, options)
 
     def view() -> Iterator[RenderableType]:
-        yield from _view(sensed)
-        yield from contacts_view(contacts, [log.name for log in sensed], limits)
+        yield from _view(judged, known)
         for path in filter(None, (options.output, options.report, options.thresholds if options.free else None)):
             yield unbroken(f"Written: {path}")
 
-    show(_document(sensed, events, options), view, as_json=options.as_json)
+    show(_document(judged, known, options), view, as_json=options.as_json)
+
+
+def _answer(sensor: ForceSensor, options: Options) -> None:
+    """Answer samples from standard input; contacts are told where something is known of them, or has to be."""
+    from tauhat.cli.sensing_lines import answer
+
+    if not (options.free or options.thresholds or options.zero):
+        answer(sensor)
+        return
+    known = _contacts(options).prepared(sensor)
+    standing = options.zero is not None and options.zero.kind == "standing"
+    answer(known.sensor, known.thresholds, zero="standing" if standing else "as sensed")
 
 
 def _contacts(options: Options) -> ContactChoice:
     from tauhat.cli.contact_choice import ContactChoice
 
     return ContactChoice(
-        free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms, map_file=options.map_file
-    )
+        free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms,
+        map_file=options.map_file, zero=options.zero or ZeroChoice(),
+    )  # fmt: skip
 
 
 def _streamed_rate(options: Options) -> float:
@@ -181,6 +198,10 @@ def _streamed_rate(options: Options) -> float:
             raise typer.BadParameter(
                 f"not together with {name}: samples come and answers go as lines", param_hint="'--input'"
             )
+    if options.zero is not None and options.zero.kind == "air":
+        raise typer.BadParameter(
+            "not together with --zero air:LOG: nobody says when the motion begins", param_hint="'--input'"
+        )
     if options.rate is None:
         raise typer.BadParameter("needs --rate, the rate of the samples", param_hint="'--input'")
     return options.rate
@@ -206,44 +227,61 @@ def _logs(options: Options) -> list[Log]:
     return [read_log(log, map=options.map_file, rows=options.rows) for log in options.logs or ()]
 
 
-def _sensed(choice: Any, log: Log, rate: float | None) -> SensedLog:
+def _rate(log: Log) -> float:
     from tauhat.errors import SensingError
     from tauhat.sensing.sensor import usual_step
 
-    step = usual_step(log.t) if rate is None else 1.0 / rate
+    step = usual_step(log.t)
     if not step > 0.0:
         raise SensingError("the log has no rate", where=log.path, got=f"{log.n_t} samples")
-    found: SensedLog = choice.sensor(1.0 / step).along(log)
-    return found
+    return 1.0 / step
 
 
-def _write(sensed: Sequence[SensedLog], logs: Sequence[Log], options: Options) -> None:
+def _judged(known: Prepared, log: Log, rate: float, options: Options) -> JudgedLog:
+    from tauhat.sensing.judged_log import judged_log
+
+    sensor = known.sensor if known.sensor.rate == rate else replace(known.sensor, rate=rate)
+    standing = options.zero is not None and options.zero.kind == "standing"
+    return judged_log(sensor, log, known.thresholds, zero="standing" if standing else "as sensed", air=known.air)
+
+
+def _write(judged: Sequence[JudgedLog], logs: Sequence[Log], options: Options) -> None:
     if options.output is not None:
         from tauhat.recordings.writing import write_columns
         from tauhat.sensing.sensed_log import sensed_columns, sensed_metadata
 
+        sensed = [log.sensed for log in judged]
         write_columns(sensed_columns(sensed), options.output, metadata=sensed_metadata(sensed[0]))
     if options.report is not None:
         from tauhat.report.sensing_page import write_sensing_report
 
-        write_sensing_report(options.report, sensed, measured=[log.wrench for log in logs])
+        write_sensing_report(options.report, judged, measured=[log.wrench for log in logs])
 
 
-def _document(sensed: Sequence[SensedLog], events: list[dict[str, Any]], options: Options) -> dict[str, Any]:
+def _document(judged: Sequence[JudgedLog], known: Prepared, options: Options) -> dict[str, Any]:
+    sensed = [log.sensed for log in judged]
     return {
         "samples": sum(log.n_t for log in sensed),
-        "events": events,
+        "events": [
+            {"log": place, **event.to_dict()} for place, log in enumerate(judged) for event in log.contacts.events
+        ],
         "observer": options.observer,
         "frame": sensed[0].frame,
         "axes": sensed[0].axes,
+        "zero": (options.zero or ZeroChoice()).kind,
+        "error": {"from": known.source, "rms": known.sensor.model.rms.tolist()},
+        "promised": known.thresholds.promised,
         "output": str(options.output) if options.output else None,
         "report": str(options.report) if options.report else None,
-        "logs": [log.to_dict() for log in sensed],
+        "logs": [{**log.sensed.to_dict(), "hidden": log.hidden.to_dict()} for log in judged],
     }
 
 
-def _view(sensed: Sequence[SensedLog]) -> Iterator[RenderableType]:
-    from tauhat.cli.views.sensing import sensing_view
+def _view(judged: Sequence[JudgedLog], known: Prepared) -> Iterator[RenderableType]:
+    from tauhat.cli.views.contacts import contacts_view
+    from tauhat.cli.views.sensing import error_view, sensing_view
 
-    for log in sensed:
+    for log in judged:
         yield from sensing_view(log)
+    yield error_view(known.source)
+    yield from contacts_view(judged)

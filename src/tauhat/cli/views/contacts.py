@@ -11,30 +11,35 @@ from tauhat.report.formatting import number
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tauhat.sensing.contact import ContactEvent
     from tauhat.sensing.contact_thresholds import ContactThresholds
+    from tauhat.sensing.judged_log import JudgedLog
 
 _SHOWN = 20
 
 
-def contacts_view(
-    found: Sequence[tuple[int, ContactEvent]], names: Sequence[str], thresholds: ContactThresholds
-) -> Iterator[RenderableType]:
-    """Yield the first contacts, and how far the thresholds can be trusted."""
+def contacts_view(judged: Sequence[JudgedLog]) -> Iterator[RenderableType]:
+    """Yield the first contacts, what they are, and how far the thresholds can be trusted."""
     from rich.markup import escape
     from rich.text import Text
 
+    from tauhat.report.contact_words import kind_of
+
+    found = [(log.sensed.name, event) for log in judged for event in log.contacts.events]
     if found:
-        made = table("Contacts", ("log", "link"), ("from s", "to s", "peak N", "x threshold"))
-        for place, event in found[:_SHOWN]:
-            figures = (f"{event.start:.2f}", f"{event.end:.2f}", f"{event.peak:.1f}", f"{event.excess:.1f}")
-            made.add_row(escape(names[place]), escape(event.link), *figures)
+        several = len(judged) > 1
+        texts = ("log",) * several + ("link", "what")
+        made = table("Contacts", texts, ("from s", "to s", "peak N", "±", "x threshold"))
+        for name, event in found[:_SHOWN]:
+            sizes = (event.start, event.end), (event.peak, event.peak_std, event.excess)
+            figures = (*(f"{value:.2f}" for value in sizes[0]), *(f"{value:.1f}" for value in sizes[1]))
+            made.add_row(*(escape(name),) * several, escape(event.link), kind_of(event), *figures)
         yield made
     more = f", the first {_SHOWN} are shown" if len(found) > _SHOWN else ""
-    yield Text(f"Contacts: {len(found)}{more}; {_worth(thresholds)}\n")
+    yield Text(f"Contacts: {len(found)}{more}; {worth(judged[0].thresholds)}\n")
 
 
-def _worth(thresholds: ContactThresholds) -> str:
+def worth(thresholds: ContactThresholds) -> str:
+    """Return what is known of false contacts."""
     if not thresholds.seconds.any():
         return "no free motion was given (--free LOG), so nothing is known of false ones."
     if thresholds.keeps_rate:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tauhat.studies.force_sensing.findings import STEADY, THERMAL, Findings, mean, median
+from tauhat.studies.force_sensing.findings import REFRESH, STEADY, THERMAL, Findings, mean, median
 from tauhat.studies.force_sensing.trials import PACES, WARMTHS
 from tauhat.studies.study import Cell, Chapter, Chart, Series, Table
 
@@ -14,21 +14,24 @@ _HONEST = (0.93, 0.97)  # share of 95 % intervals that may hold the truth
 def summary_of(found: Findings) -> str:
     """Return the answer in a few sentences."""
     steady, thermal = (np.median(found.drift(name)) for name in (STEADY, THERMAL))
-    cold = [median(found.of(name, pace="moving", warmth="cold"), "force_rms") for name in (STEADY, THERMAL)]
-    warm = [median(found.of(name, pace="moving", warmth="warm"), "force_rms") for name in (STEADY, THERMAL)]
+    names = STEADY, THERMAL, REFRESH
+    cold, warm = (
+        [median(found.of(name, pace="moving", warmth=warmth), "force_rms") for name in names] for warmth in WARMTHS
+    )
     inside = mean(found.of(THERMAL), "force_inside")
     return (
         f"{found.seeds} arms ({found.scene.robot}), pushes of about {found.scene.force:g} N a component. Moving, "
         f"the force of the {THERMAL} observer is off by {cold[1]:.3g} N cold and {warm[1]:.3g} N warm, that of the "
-        f"{STEADY} observer, which knows no warmth, by {cold[0]:.3g} and {warm[0]:.3g} N. Friction drifts by "
-        f"{thermal:.3g} Nm between cold and warm in place of {steady:.3g}. Of the 95 % intervals of force "
+        f"{STEADY} observer, which knows no warmth, by {cold[0]:.3g} and {warm[0]:.3g} N, and that of the {REFRESH} "
+        f"observer, which follows friction with the same model, by {cold[2]:.3g} and {warm[2]:.3g} N. Friction drifts "
+        f"by {thermal:.3g} Nm between cold and warm in place of {steady:.3g}. Of the 95 % intervals of force "
         f"{100 * inside:.3g} % hold the truth."
     )
 
 
 def chapters_of(found: Findings) -> tuple[Chapter, ...]:
-    """Return what was done, the forces, the error bars, and the drift."""
-    return _scene(found), _forces(found), _bars(found), _drift(found)
+    """Return what was done, the forces, the error bars, what errors have in common, and the drift."""
+    return _scene(found), _forces(found), _bars(found), _together(found), _drift(found)
 
 
 def _scene(found: Findings) -> Chapter:
@@ -100,16 +103,17 @@ def _bars(found: Findings) -> Chapter:
             100.0 * mean(outcomes, figure) for outcomes in of_pace for figure in ("torque_inside", "force_inside")
         ]
         rows.append((observer, *shares))
-    honest = [
-        f"{observer}, {pace}"
+    outside = [
+        f"{observer}, {pace}, {what}"
         for observer in found.observers
         for pace in PACES
-        if not _HONEST[0] <= mean(found.of(observer, pace=pace), "force_inside") <= _HONEST[1]
+        for what, figure in (("joint torque", "torque_inside"), ("force", "force_inside"))
+        if not _HONEST[0] <= mean(found.of(observer, pace=pace), figure) <= _HONEST[1]
     ]
     words = (
-        "Error bars of the force hold the truth as often as they say, between 93 and 97 %, for every observer."
-        if not honest
-        else f"Outside 93 to 97 % for the force: {'; '.join(honest)}."
+        "Error bars hold the truth as often as they say, 93 to 97 %, for every observer, joint torque and force."
+        if not outside
+        else f"Outside 93 to 97 %: {'; '.join(outside)}."
     )
     return Chapter(
         title="Error bars",
@@ -128,21 +132,49 @@ def _bars(found: Findings) -> Chapter:
     )
 
 
+def _together(found: Findings) -> Chapter:
+    rows: list[tuple[Cell, ...]] = []
+    for observer in found.observers:
+        row: list[Cell] = [observer]
+        for pace in PACES:
+            outcomes = found.of(observer, pace=pace)
+            row += [median(outcomes, "apart_rms"), median(outcomes, "force_rms")]
+            row += [100.0 * mean(outcomes, "apart_inside"), 100.0 * mean(outcomes, "force_inside")]
+        rows.append(tuple(row))
+    words = (
+        "One wrong mass or one temperature is felt by several joints. `Together` weights them by the correlation that "
+        "the work in air showed, as everywhere else on this page; `apart` takes each joint for itself."
+    )
+    told = "apart: RMS [N]", "together: RMS [N]", "apart: inside [%]", "together: inside [%]"
+    return Chapter(
+        title="What errors of joints have in common",
+        text=(words,),
+        tables=(
+            Table(
+                title="Force with and without the correlation of joints",
+                header=("observer", *(f"{pace}, {what}" for pace in PACES for what in told)), rows=tuple(rows),
+                note="Cold and warm together: medians of RMS, mean shares of the 95 % intervals that hold the truth.",
+            ),
+        ),
+    )  # fmt: skip
+
+
 def _drift(found: Findings) -> Chapter:
-    steady, thermal = found.drift(STEADY), found.drift(THERMAL)
+    steady, thermal, refresh = (found.drift(name) for name in (STEADY, THERMAL, REFRESH))
     ratios = np.array(thermal) / np.maximum(steady, np.finfo(float).tiny)
     better = int(np.sum(ratios <= 0.5))
     words = (
         f"The friction torque that a sensor takes for force changes by {np.median(steady):.3g} Nm from cold to warm "
         f"without a thermal model and by {np.median(thermal):.3g} Nm with it: median ratio {np.median(ratios):.2f}, "
-        f"at most half on {better} of {found.seeds} arms."
+        f"at most half on {better} of {found.seeds} arms. Following friction without such a model leaves "
+        f"{np.median(refresh):.3g} Nm."
     )
     table = Table(
         title="Drift of friction torque from cold to warm [Nm]",
-        header=("arm", STEADY, THERMAL, "ratio"),
+        header=("arm", STEADY, THERMAL, "ratio", REFRESH),
         rows=tuple(
-            (number, float(a), float(b), float(ratio))
-            for number, (a, b, ratio) in enumerate(zip(steady, thermal, ratios, strict=True))
+            (number, float(a), float(b), float(ratio), float(c))
+            for number, (a, b, ratio, c) in enumerate(zip(steady, thermal, ratios, refresh, strict=True))
         ),
         note="Mean error along the motion, joints in root mean square.",
     )

@@ -9,7 +9,7 @@ import numpy as np
 from tauhat.studies.force_sensing.scene import Pace, SceneSettings, Warmth
 from tauhat.studies.force_sensing.trials import Outcome
 
-STEADY, THERMAL = "momentum", "thermal"
+STEADY, REFRESH, THERMAL = "momentum", "refresh", "thermal"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,7 @@ from tauhat.sensing.free_motion import learnt_from_free_motion
 from tauhat.sensing.observers import OBSERVERS, ThermalObserver, observer_named
 from tauhat.sensing.sensor import ForceSensor, force_sensor
 from tauhat.sensing.wrench import WrenchSolver, directions_named
+from tauhat.sensing.zero import zeroed
 from tauhat.studies.force_sensing.scene import ContactScene, Pace, PushedLog, SceneSettings, Warmth
 
 PACES: tuple[Pace, ...] = ("moving", "standing")
@@ -47,6 +48,7 @@ class Outcome:
 
     force_rms, force_95 : of the size of the force's error, root mean square and 95 % quantile [N]
     torque_inside, force_inside : share of the 95 % intervals of joint torque and force that hold the truth
+    apart_rms, apart_inside : the same of the force where errors of joints are taken as independent [N, 1]
     friction : torque error along the motion, mean over a joint's samples of error times direction (n_v,) [Nm or N];
         empty where the arm stands
     """
@@ -59,6 +61,8 @@ class Outcome:
     force_95: float = np.nan
     torque_inside: float = np.nan
     force_inside: float = np.nan
+    apart_rms: float = np.nan
+    apart_inside: float = np.nan
     friction: tuple[float, ...] = ()
 
 
@@ -93,6 +97,9 @@ def _outcome(blank: Outcome, sensor: ForceSensor, log: PushedLog) -> Outcome:
     rows = sensed.rows[first + late :] - late
     window = slice(first + late, None)
     force, torque = sensed.wrench[window, :3] - log.force[rows], sensed.tau[window] - log.torque[rows]
+    independent = replace(sensor.solver, correlation=np.eye(sensor.n_v))
+    each = zeroed(sensed, np.zeros_like(sensed.tau), solver=independent)
+    apart = each.wrench[window, :3] - log.force[rows]
     size = np.linalg.norm(force, axis=1)
     inside = np.abs(torque) <= _INTERVAL * sensed.tau_std[window]
     held = np.abs(force) <= _INTERVAL * sensed.wrench_std[window, :3]
@@ -102,6 +109,8 @@ def _outcome(blank: Outcome, sensor: ForceSensor, log: PushedLog) -> Outcome:
         force_95=float(np.quantile(size, 0.95)),
         torque_inside=float(np.mean(inside)),
         force_inside=float(np.mean(held)),
+        apart_rms=float(np.sqrt(np.mean(np.sum(np.square(apart), axis=1)))),
+        apart_inside=float(np.mean(np.abs(apart) <= _INTERVAL * each.wrench_std[window, :3])),
         friction=_along_motion(torque, sensed.dq[window], sensor.model.slow) if blank.pace == "moving" else (),
     )
 

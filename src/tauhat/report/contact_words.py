@@ -1,0 +1,34 @@
+"""What terminal and page say of contacts: a hand or a body, and directions that joints do not tell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from tauhat.report.formatting import number
+
+if TYPE_CHECKING:
+    from tauhat.sensing.contact import ContactEvent
+    from tauhat.sensing.hidden import Hidden
+
+_PERCENT = 100.0
+
+
+def kind_of(event: ContactEvent) -> str:
+    """Return what an event is: a contact, a body that is carried, either; nothing where it was too short to tell."""
+    found = event.payload
+    if found is None:
+        return ""
+    if found.verdict == "no payload":
+        return "contact"
+    return f"{'carries' if found.verdict == 'payload' else 'push, or'} {found.mass:.2f} kg"
+
+
+def hidden_words(hidden: Hidden) -> str:
+    """Return for how long joints did not tell a direction of the wrench, and which; nothing where they always did."""
+    if not hidden.share:
+        return ""
+    return (
+        f"For {number(_PERCENT * hidden.share)} % of the time joints do not tell every direction (mostly "
+        f"{', '.join(hidden.mostly)}), as near singular positions: the error bar there is that of the largest wrench "
+        "conceivable."
+    )
