@@ -23,11 +23,13 @@ from tauhat.cli.commands import (
     identify,
     inspect,
     payload,
+    record,
     rehearse,
     report,
     robots,
     run,
     sense,
+    serve,
     simulate,
     study,
     verify,
@@ -50,6 +52,7 @@ app.command("robots")(as_command(robots.run, robots.Options))
 app.command("inspect")(as_command(inspect.run, inspect.Options))
 app.command("check")(as_command(check.run, check.Options))
 app.command("excite")(as_command(excite.run, excite.Options))
+app.command("record")(as_command(record.run, record.Options))
 app.command("simulate")(as_command(simulate.run, simulate.Options))
 app.command("rehearse")(as_command(rehearse.run, rehearse.Options))
 app.command("budget")(as_command(budget.run, budget.Options))
@@ -58,6 +61,7 @@ app.command("verify")(as_command(verify.run, verify.Options))
 app.command("payload")(as_command(payload.run, payload.Options))
 app.command("calibrate-drives")(as_command(calibrate_drives.run, calibrate_drives.Options))
 app.command("sense")(as_command(sense.run, sense.Options))
+app.command("serve")(as_command(serve.run, serve.Options))
 app.command("compare")(as_command(compare.run, compare.Options))
 app.command("study")(as_command(study.run, study.Options))
 app.command("report")(as_command(report.run, report.Options))

@@ -110,7 +110,7 @@ class BoundLog:
 
     def _signals(self, raw: FloatArray, low: int, high: int) -> dict[str, Any]:
         return {
-            _FIELDS[kind]: _joint_side(_undelayed(raw[:, self.slots[kind]], signal, low, high), signal, self.log_map)
+            _FIELDS[kind]: joint_side(_undelayed(raw[:, self.slots[kind]], signal, low, high), signal, self.log_map)
             for kind, signal in self.log_map.signals().items()
         }
 
@@ -217,7 +217,8 @@ def _undelayed(raw: FloatArray, signal: SignalMap, low: int, high: int) -> Float
     return values if part == 0 else (1.0 - part) * values + part * raw[low + whole + 1 : high + whole + 1]
 
 
-def _joint_side(values: FloatArray, signal: SignalMap, log_map: LogMap) -> FloatArray:
+def joint_side(values: FloatArray, signal: SignalMap, log_map: LogMap) -> FloatArray:
+    """Return raw numbers (n_t, columns) of one quantity in SI on the joint side, its delay left out."""
     scaled = values * signal.factors(values.shape[1])
     matrix = _matrix(log_map.coupling, signal.kind)
     coupled = scaled if matrix is None else scaled @ matrix.T

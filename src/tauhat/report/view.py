@@ -12,14 +12,12 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.errors import MissingExtraError, OutputError
+from tauhat.report.arm_scene import draw_arm, move_arm
 from tauhat.report.replay import Replay
-from tauhat.robots.transforms import quaternion
 
 HOST = "127.0.0.1"
 _FRAMES_PER_SECOND = 30.0
 _BARS_PER_SECOND = 8.0
-_LINKS = ((125, 176, 238), (95, 108, 128))
-_JOINTS = (217, 101, 27)
 _AWAY, _AZIMUTH = 1.78, 0.666  # of the camera: parts of the reach, [rad] from the x axis or the region
 _REGION, _PATH = (47, 158, 98), (176, 68, 127)
 _REGION_WIDTH, _PATH_WIDTH = 3.0, 1.5  # [px]
@@ -40,7 +38,7 @@ class Viewer:
     ) -> None:
         self._replay = replay
         self.server = _server(port)
-        self._frames = _scene(self.server.scene, replay)
+        self._frames = draw_arm(self.server.scene, replay.body, reach=replay.reach)
         _draw(self.server.scene, "/region", outline, colour=_REGION, width=_REGION_WIDTH)
         _draw(self.server.scene, "/path", () if path is None else (path,), colour=_PATH, width=_PATH_WIDTH)
         self._server_looks_at(replay.reach, outline)
@@ -65,9 +63,7 @@ class Viewer:
         """Put the arm where it is at a time of the motion [s]."""
         index, poses = self._replay.index(moment), self._replay.poses
         with self.server.atomic():
-            for link, frame in enumerate(self._frames):
-                frame.wxyz = quaternion(poses.rotation[link, index])
-                frame.position = poses.origin[link, index]
+            move_arm(self._frames, poses, index)
         now = time.monotonic()
         if now >= self._bars_due:
             self._bars.content = self._replay.margins(index)
@@ -121,32 +117,6 @@ def _server(port: int) -> Any:
         raise OutputError("the port cannot be used", got=port, remedy="choose another with --port") from error
 
 
-def _scene(scene: Any, replay: Replay) -> list[Any]:
-    """Build floor, links and joints; return the frame of each link."""
-    robot, reach = replay.body.robot, replay.reach
-    size = 0.25 if reach > 0.5 else 0.05
-    scene.set_up_direction("+z")
-    scene.add_grid("/floor", width=4.0 * reach, height=4.0 * reach, cell_size=size, section_size=4 * size)
-    scene.add_frame("/base", axes_length=0.15 * reach, axes_radius=0.006 * reach)
-    frames = [scene.add_frame(f"/links/{index}", show_axes=False) for index in range(robot.n_v)]
-    for index, capsule in enumerate(replay.body.capsules):
-        place = f"/links/{capsule.link}/{index}" if capsule.link >= 0 else f"/base/{index}"
-        colour = _LINKS[capsule.link % len(_LINKS)]
-        middle, wxyz = 0.5 * (capsule.start + capsule.end), _along(capsule.end - capsule.start)
-        radius = 0.8 * capsule.radius
-        scene.add_cylinder(
-            f"{place}/bar", radius=radius, height=capsule.length, color=colour, position=middle, wxyz=wxyz
-        )
-        for end, point in (("start", capsule.start), ("end", capsule.end)):
-            scene.add_icosphere(f"{place}/{end}", radius=radius, color=colour, position=point)
-    for index, joint in enumerate(robot.joints):
-        radius = 0.9 * max(capsule.radius for capsule in replay.body.capsules)
-        scene.add_cylinder(
-            f"/links/{index}/joint", radius=radius, height=2.2 * radius, color=_JOINTS, wxyz=_along(joint.axis)
-        )
-    return frames
-
-
 def _draw(scene: Any, name: str, lines: Sequence[FloatArray], *, colour: tuple[int, int, int], width: float) -> None:
     """Draw lines, (n, 3) each [m]."""
     parts = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
@@ -154,12 +124,3 @@ def _draw(scene: Any, name: str, lines: Sequence[FloatArray], *, colour: tuple[i
         scene.add_line_segments(
             name, points=np.concatenate(parts), colors=colour, thickness=width, thickness_units="screen"
         )
-
-
-def _along(direction: FloatArray) -> FloatArray:
-    """Return the quaternion (w, x, y, z) of a rotation that takes z to a direction."""
-    z = direction / np.linalg.norm(direction)
-    helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    x = np.cross(helper, z)
-    x /= np.linalg.norm(x)
-    return quaternion(np.column_stack([x, np.cross(z, x), z]))

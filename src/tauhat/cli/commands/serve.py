@@ -1,0 +1,164 @@
+"""`tauhat serve`: samples of a running robot in, what touches it out, and a page in the browser."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tauhat.cli.options import EstimateArgument, JsonOption, MapOption, frequency
+from tauhat.cli.output import show, unbroken
+from tauhat.cli.reporting import say, working
+from tauhat.cli.sensing_options import (
+    AlarmsOption,
+    AxesOption,
+    CutoffOption,
+    DirectionsOption,
+    FrameOption,
+    FreeOption,
+    GainOption,
+    ObserverOption,
+    StampsOption,
+    ThresholdsOption,
+    ToolOption,
+)
+
+if TYPE_CHECKING:
+    from tauhat.cli.contact_choice import Prepared
+    from tauhat.live.access import Access
+    from tauhat.live.feed import Page
+    from tauhat.live.server import Channels
+
+_WEBSOCKET = 8765
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What `tauhat serve` takes."""
+
+    estimate: EstimateArgument
+    rate: Annotated[
+        float,
+        typer.Option("--rate", metavar="HZ", parser=frequency, help="Of the samples.", show_default=False),
+    ]
+    websocket: Annotated[
+        int | None,
+        typer.Option(
+            "--websocket", metavar="PORT", min=0, max=65535, show_default="8765, without --udp and --pipe",
+            help="Samples over WebSocket, one a text message; 0 for any port that is free.",
+        ),
+    ] = None  # fmt: skip
+    udp: Annotated[
+        int | None,
+        typer.Option(
+            "--udp", metavar="PORT", min=0, max=65535, show_default=False,
+            help="Samples as datagrams, answered to where they come from.",
+        ),
+    ] = None  # fmt: skip
+    pipe: Annotated[
+        Path | None,
+        typer.Option(
+            "--pipe", metavar="PATH", show_default=False, help="Samples as lines over a Unix socket made at this path."
+        ),
+    ] = None
+    host: Annotated[
+        str,
+        typer.Option("--host", metavar="ADDRESS", help="Where ports listen; any but this machine's needs a token."),
+    ] = "127.0.0.1"
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--token-file", metavar="FILE", show_default=False, readable=False,
+            help="File of mode 0600 with the secret that clients and browsers have to know.",
+        ),
+    ] = None  # fmt: skip
+    clients: Annotated[int, typer.Option("--clients", metavar="N", min=1, help="At a time, over all channels.")] = 8
+    page: Annotated[
+        int, typer.Option("--page", metavar="PORT", min=0, max=65535, help="Of the page in the browser.")
+    ] = 8080
+    no_page: Annotated[bool, typer.Option("--no-page", help="Serve without a page.")] = False
+    observer: ObserverOption = "momentum"
+    gain: GainOption = None
+    cutoff: CutoffOption = None
+    frame: FrameOption = None
+    directions: DirectionsOption = "wrench"
+    axes: AxesOption = "base"
+    tool: ToolOption = None
+    stamps: StampsOption = "auto"
+    free: FreeOption = None
+    thresholds: ThresholdsOption = None
+    alarms: AlarmsOption = 1.0
+    map_file: MapOption = None
+    as_json: JsonOption = False
+
+
+def run(options: Options) -> None:
+    """Answer the samples of running robots with what touches them, and show it in the browser, until interrupted."""
+    from tauhat.live.feed import Feed
+    from tauhat.live.limits import Limits
+    from tauhat.live.server import serve
+    from tauhat.live.service import Service
+
+    channels = _channels(options)
+    with working("preparing"):
+        known = _prepared(options)
+        page = None if options.no_page else _page(known, channels.access, options.page)
+    limits = Limits(clients=options.clients)
+    service = Service(sensor=known.sensor, thresholds=known.thresholds, limits=limits, feed=Feed(page))
+    robot = known.sensor.model.robot.name
+
+    def started(addresses: Mapping[str, str]) -> None:
+        document = {"robot": robot, "rate": options.rate, **addresses}
+        document |= {} if page is None else {"page": page.url}
+        show(document, lambda: [unbroken(_text(document))], as_json=options.as_json)
+        sys.stdout.flush()
+
+    totals = serve(service, channels, started=started)
+    say(
+        "done",
+        ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in totals.items() if count) or "nobody came",
+    )
+
+
+def _channels(options: Options) -> Channels:
+    from tauhat.live.access import Access, read_token
+    from tauhat.live.server import Channels
+
+    token = None if options.token_file is None else read_token(options.token_file)
+    alone = options.udp is None and options.pipe is None
+    websocket = _WEBSOCKET if options.websocket is None and alone else options.websocket
+    access = Access(host=options.host, token=token)
+    return Channels(websocket=websocket, udp=options.udp, pipe=options.pipe, access=access)
+
+
+def _prepared(options: Options) -> Prepared:
+    """Return sensor and thresholds, as `tauhat sense` makes them."""
+    from tauhat.cli.contact_choice import ContactChoice
+    from tauhat.cli.sensor_choice import SensorChoice
+
+    choice = SensorChoice(
+        estimate=options.estimate, observer=options.observer, gain=options.gain, cutoff=options.cutoff,
+        frame=options.frame, directions=options.directions, axes=options.axes, tool=options.tool,
+        stamps=options.stamps,
+    )  # fmt: skip
+    contacts = ContactChoice(
+        free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms, map_file=options.map_file
+    )
+    return contacts.prepared(choice.sensor(options.rate))
+
+
+def _page(known: Prepared, access: Access, port: int) -> Page:
+    from tauhat.live.page_process import start_page
+
+    solver = known.sensor.solver
+    return start_page(solver.robot, frame=str(solver.frame), axes=solver.axes, port=port, access=access)
+
+
+def _text(document: Mapping[str, Any]) -> str:
+    names = {"websocket": "WebSocket", "udp": "UDP", "pipe": "pipe", "page": "page"}
+    lines = [f"  {name:10}{document[key]}" for key, name in names.items() if key in document]
+    return "\n".join([f"{document['robot']}, samples of {document['rate']:g} Hz at", *lines, "Ctrl-C ends it."])

@@ -1,0 +1,111 @@
+"""Who is connected: a bounded number, each with its session; those that fall silent are let go."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable
+
+from tauhat.errors import LiveError
+from tauhat.live.outbox import Outbox
+from tauhat.live.service import Service
+from tauhat.live.session import Session
+from tauhat.live.throttle import Throttle
+from tauhat.live.waiting_room import WaitingRoom
+
+_LOOKED = 0.05  # [s] between looks at what the page asks for
+
+
+class Client:
+    """One stream and how it is reached.
+
+    session, outbox, throttle : its own
+    heard : when its last message came, by the loop's clock [s]
+    hang_up : ends it
+    """
+
+    __slots__ = ("hang_up", "heard", "outbox", "session", "throttle")
+
+    def __init__(self, service: Service, *, name: str, now: float, hang_up: Callable[[], object]) -> None:
+        limits = service.limits
+        self.outbox = Outbox(limits.queue, pause=limits.notice)
+        self.session = Session(service, name=name, outbox=self.outbox)
+        self.throttle = Throttle(limits.messages)
+        self.heard = now
+        self.hang_up = hang_up
+
+
+class Clients:
+    """All that are connected, over all channels.
+
+    Parameters
+    ----------
+    service : what they are given
+
+    Attributes
+    ----------
+    totals : clients so far, and the counts of those that have left
+    waiting : connections that are no clients yet
+    """
+
+    def __init__(self, service: Service) -> None:
+        self.service = service
+        self.totals: Counter[str] = Counter()
+        self.waiting = WaitingRoom(service.limits.waiting)
+        self._clients: set[Client] = set()
+
+    def __len__(self) -> int:
+        return len(self._clients)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether no more are let in."""
+        return len(self._clients) >= self.service.limits.clients
+
+    def admit(self, kind: str, now: float, *, hang_up: Callable[[], object]) -> Client:
+        """Return a new client with a session of its own.
+
+        Parameters
+        ----------
+        kind : of its channel; messages and the page call it so, with a number
+        now : by the loop's clock [s]
+        hang_up : called when it has been silent for too long
+
+        Raises
+        ------
+        LiveError
+            when there are too many.
+        """
+        if self.is_full:
+            raise LiveError(
+                "too many clients", where="server", expected=f"at most {self.service.limits.clients}",
+                remedy="come again when another has left",
+            )  # fmt: skip
+        self.totals["clients"] += 1
+        client = Client(self.service, name=f"{kind} {self.totals['clients']}", now=now, hang_up=hang_up)
+        self._clients.add(client)
+        return client
+
+    def leave(self, client: Client) -> None:
+        """Forget a client; what it streamed is gone with its session."""
+        if client in self._clients:
+            self._clients.remove(client)
+            self.totals.update(client.session.counts)
+        self.service.feed.forget(client.session.name)
+
+    async def obey(self) -> None:
+        """Do for all streams, until cancelled, what is asked for on the page."""
+        feed = self.service.feed
+        while True:
+            await asyncio.sleep(_LOOKED)
+            for name in feed.commands():
+                for client in self._clients:
+                    client.session.command(name)
+
+    async def watch(self) -> None:
+        """Let go, until cancelled, of clients that have been silent for too long."""
+        loop, idle = asyncio.get_running_loop(), self.service.limits.idle
+        while True:
+            await asyncio.sleep(min(1.0, idle / 4.0))
+            for client in [one for one in self._clients if loop.time() - one.heard > idle]:
+                client.hang_up()

@@ -1,0 +1,136 @@
+"""Samples to a server and its answers back: a recording in its own time or faster, or a robot's as they come."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from tauhat.errors import LiveError
+from tauhat.live.connection import connect
+from tauhat.recordings.log import Log
+from tauhat.recordings.recording import Recording
+
+_KEPT = 1000  # notices
+_QUIET = 2.0  # [s] without an answer after which those that are missing are no longer waited for
+_AHEAD = 64  # samples without an answer before the next is sent
+_NAP = 0.05  # [s]
+
+
+class Sender:
+    """A client of `tauhat serve` on any of its channels, in one thread; use as a context.
+
+    Parameters
+    ----------
+    address : as the server prints it, `ws://host:port/`, `udp://host:port` or `unix:path`
+    token : where the server asks for one
+
+    Raises
+    ------
+    LiveError
+        when nobody answers there, or the server refuses.
+    """
+
+    def __init__(self, address: str, *, token: str | None = None) -> None:
+        self.address = address
+        self.hello: dict[str, Any] = {}
+        self.notices: deque[dict[str, Any]] = deque(maxlen=_KEPT)
+        self._connection = connect(address)
+        if token is not None:
+            self._connection.send(json.dumps({"token": token}))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the connection."""
+        self._connection.close()
+
+    def send(self, t: float, q: Sequence[float], tau: Sequence[float]) -> None:
+        """Send a sample.
+
+        Parameters
+        ----------
+        t : time stamp [s]
+        q, tau : position and motor torque of every joint, joint side [rad or m, Nm or N]
+        """
+        self._connection.send(json.dumps({"t": t, "q": list(q), "tau": list(tau)}))
+
+    def command(self, name: str) -> None:
+        """Ask for something: `zero`, `unzero` or `counts`; the answer is a notice."""
+        self._connection.send(json.dumps({"command": name}))
+
+    def answers(self, seconds: float = 0.0) -> list[dict[str, Any]]:
+        """Return the answers that have come, in order; notices go to `notices`, the greeting to `hello`.
+
+        Parameters
+        ----------
+        seconds : to wait for the first message
+
+        Raises
+        ------
+        LiveError
+            when the server has refused, or ended the connection.
+        """
+        found = []
+        for text in self._connection.exchange(seconds):
+            message = json.loads(text)
+            if "refused" in message:
+                raise LiveError("the server refuses", where=self.address, got=message["refused"])
+            if "hello" in message:
+                self.hello = message
+            elif "notice" in message:
+                self.notices.append(message)
+            else:
+                found.append(message)
+        if not found and not self._connection.is_open:
+            raise LiveError("the server ended the connection", where=self.address)
+        return found
+
+    def replay(self, log: Recording | Log, *, speed: float = 1.0) -> Iterator[dict[str, Any]]:
+        """Yield the answers to a recording's samples, sent at the pace of its time stamps.
+
+        Samples that the server skips have no answer; when nothing has come for two seconds it is not waited for.
+
+        Parameters
+        ----------
+        log : position and torque
+        speed : times as fast as it was recorded; inf for as fast as answers come
+
+        Raises
+        ------
+        LiveError
+            a log without torque, a speed that is none, or a server that refuses.
+        """
+        if log.tau is None or not speed > 0.0:
+            raise LiveError("nothing to replay", where=self.address, expected="a log with torque and a speed above 0")
+        times = log.t.tolist()
+        place = {t: number for number, t in enumerate(times)}
+        rows = zip(times, log.q.tolist(), log.tau.tolist(), strict=True)
+        started = latest = time.monotonic()
+        due = [started + (t - times[0]) / speed for t in times]
+        sent = answered = 0
+        while sent < len(times) or answered < len(times):
+            now = time.monotonic()
+            while sent < len(times) and due[sent] <= now and sent - answered < _AHEAD:
+                self.send(*next(rows))
+                sent, latest = sent + 1, now
+            found = self.answers(_pause(due, sent, now) if sent - answered < _AHEAD else _NAP)
+            for answer in found:
+                answered, latest = max(answered, place.get(answer["t"], -1) + 1), now
+                yield answer
+            if not found and now - latest > _QUIET:
+                answered = sent
+
+
+def _pause(due: Sequence[float], sent: int, now: float) -> float:
+    """Return how long to wait for answers before the next sample is due [s]."""
+    return min(_NAP, max(0.0, due[sent] - now)) if sent < len(due) else _NAP

@@ -1,0 +1,154 @@
+"""One client's stream: messages in, answers into its outbox; knows nothing of sockets or clocks."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from tauhat.arrays import FloatArray
+from tauhat.live.feed import Snapshot
+from tauhat.live.outbox import Outbox
+from tauhat.live.protocol import COMMANDS, AnswerForm, Command, decoded, message_of, notice_text
+from tauhat.live.service import Service
+from tauhat.sensing.sample_lines import Sample
+from tauhat.sensing.sensor import Sensed
+from tauhat.sensing.stream import SensorStream
+
+
+class Session:
+    """A stream of samples and what is said about it.
+
+    Parameters
+    ----------
+    service : sensor, thresholds, limits and page
+    name : how messages and the page call the stream
+    outbox : where answers go
+    """
+
+    def __init__(self, service: Service, *, name: str, outbox: Outbox) -> None:
+        self.name = name
+        self._service = service
+        self._outbox = outbox
+        self._stream = SensorStream(sensor=service.sensor, name=name)
+        self._memory = self._stream.start()
+        self._contact = None if service.detector is None else service.detector.start()
+        self._link: str | None = None
+        self._touched = False
+        self._form = AnswerForm(service.sensor.n_v)
+        self._links = {link: json.dumps(link) for link in service.sensor.model.robot.joint_names}
+        self._zero: FloatArray | None = None
+        self._last: Sensed | None = None
+        self._malformed = self._limited = 0
+        self._told = {"skipped": -np.inf, "slowed": -np.inf}
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many samples were taken, why others were not, and answers that were dropped."""
+        counts = self._memory.counts._replace(malformed=self._malformed)
+        return counts._asdict() | {"limited": self._limited, "dropped": self._outbox.dropped}
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Answer a message.
+
+        Parameters
+        ----------
+        data : one message as it came
+        now : on any clock [s]
+
+        Raises
+        ------
+        SensingError
+            samples of another robot or rate: the conversation is over.
+        EOFError
+            the client has said that it ends.
+        """
+        message = message_of(decoded(data, self._service.limits), self._service.sensor.model.robot, where=self.name)
+        if isinstance(message, Sample):
+            self._take(message, now)
+        elif isinstance(message, Command):
+            if message.name == "end":
+                raise EOFError
+            self.command(message.name)
+        elif message is None:
+            self._malformed += 1
+            self._tell("skipped", now)
+
+    def command(self, name: str) -> None:
+        """Do what was asked for, by the client or on the page."""
+        if name not in COMMANDS:
+            return
+        if name == "counts":
+            self._outbox.put(notice_text("counts", counts=self.counts), answers=0)
+            return
+        last = self._last
+        self._zero = last.tau.copy() if name == "zero" and last is not None else None
+        if self._service.detector is not None:
+            self._contact = self._service.detector.start()
+        taken_off = np.zeros(self._service.sensor.n_v) if self._zero is None else self._zero
+        self._outbox.put(notice_text("zero", tau_ext=[float(f"{value:.6g}") for value in taken_off]), answers=0)
+
+    def slowed(self, now: float, *, lost: int = 0) -> None:
+        """Say that messages come faster than granted, and how many were lost of it."""
+        self._limited += lost
+        self._tell("slowed", now)
+
+    def _take(self, sample: Sample, now: float) -> None:
+        n_v, counts = self._service.sensor.n_v, self._memory.counts
+        if not len(sample.q) == n_v == len(sample.tau) and counts.taken:
+            self._malformed += 1
+            self._tell("skipped", now)
+            return
+        self._memory, sensed = self._stream.take(self._memory, sample.t, np.array(sample.q), np.array(sample.tau))
+        if sensed is None:
+            self._tell("skipped", now)
+            return
+        self._last = sensed
+        tau, wrench = self._zeroed(sensed)
+        more = self._judged(sensed, tau)
+        self._outbox.put(self._form.text(sample.t, (tau, sensed.variance, wrench, sensed.covariance), more))
+        if self._service.feed.is_due(self.name, now):
+            self._service.feed.publish(self._snapshot(sample.t, sensed, tau, wrench))
+
+    def _zeroed(self, sensed: Sensed) -> tuple[FloatArray, FloatArray]:
+        """Return external torque and wrench less the zero; its error bars stay, since they are the model's."""
+        if self._zero is None:
+            return sensed.tau, sensed.wrench
+        tau = sensed.tau - self._zero
+        return tau, self._service.solver.at(sensed.q, tau, sensed.variance + np.square(sensed.lag)).wrench
+
+    def _judged(self, sensed: Sensed, tau: FloatArray) -> str:
+        """Return what is said of contact, as further members of the answer."""
+        detector, memory = self._service.detector, self._contact
+        if detector is None or memory is None:
+            return ""
+        self._contact, found = detector.advance(memory, tau, sensed.variance, sensed.dq, settled=sensed.settled)
+        self._link = found.link
+        link = "null" if found.link is None else self._links[found.link]
+        said = f', "contact": {"true" if found.contact else "false"}, "excess": {found.excess:.4g}, "link": {link}'
+        if found.contact != self._touched:
+            self._touched = found.contact
+            said += f', "event": "{"start" if found.contact else "end"}"'
+        return said
+
+    def _snapshot(self, t: float, sensed: Sensed, tau: FloatArray, wrench: FloatArray) -> Snapshot:
+        counts = self._memory.counts
+        return Snapshot(
+            self.name, t, sensed.q, tau, np.sqrt(sensed.variance), wrench, sensed.covariance, self._link or "",
+            {
+                "taken": counts.taken, "late": counts.late + counts.repeated, "not_finite": counts.not_finite,
+                "dropped": self._outbox.dropped, "refused": self._malformed + self._limited,
+                "restarts": counts.restarts,
+            },
+        )  # fmt: skip
+
+    def _tell(self, kind: str, now: float) -> None:
+        """Say of samples that were not taken, not too often: whoever wants the last word asks for the counts."""
+        if now - self._told[kind] < self._service.limits.notice:
+            return
+        self._told[kind] = now
+        facts: dict[str, Any] = {"counts": self.counts}
+        if kind == "slowed":
+            facts["messages_a_second"] = self._service.limits.messages
+        self._outbox.put(notice_text(kind, **facts), answers=0)

@@ -1,0 +1,81 @@
+"""`tauhat serve`: one command from an estimate to answers; it ends cleanly when it is told to."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from live_server import TOKEN
+from typer.testing import CliRunner, Result
+
+from tauhat.cli.app import app
+from tauhat.live import Sender
+from tauhat.recordings import read_recording
+
+RATE = 250
+
+
+def run_tauhat(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words], env={"COLUMNS": "80"})
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a log of a two-link arm, and its estimate."""
+    found = tmp_path_factory.mktemp("serve")
+    assert (
+        run_tauhat("simulate", "two_link", "-o", found / "log.parquet", "--seconds", 4, "--rate", RATE).exit_code == 0
+    )
+    assert run_tauhat("identify", "two_link", found / "log.parquet", "-o", found / "estimate.json").exit_code == 0
+    return found
+
+
+def test_samples_are_answered_until_sigterm_and_nothing_is_left_behind(folder: Path):
+    words = ["serve", folder / "estimate.json", "--rate", RATE, "--websocket", 0, "--pipe", folder / "s", "--no-page"]
+    command = [sys.executable, "-m", "tauhat", *map(str, words), "--json"]
+    log = read_recording(folder / "log.parquet").rows(0, 200)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        lines = [process.stdout.readline()]
+        while not lines[-1].startswith("}"):
+            lines.append(process.stdout.readline())
+        document: dict[str, Any] = json.loads("".join(lines))
+        for channel in ("websocket", "pipe"):
+            with Sender(document[channel]) as sender:
+                answers = list(sender.replay(log, speed=np.inf))
+                assert len(answers) == 200
+                assert answers[-1]["contact"] in {True, False}
+        with Sender(document["websocket"]) as staying:
+            staying.command("counts")
+            process.send_signal(signal.SIGTERM)
+            _, errors = process.communicate(timeout=10.0)
+    assert process.returncode == 0
+    assert errors == "done: 3 clients, 400 taken\n"
+    assert not (folder / "s").exists()
+    assert document["robot"] == "two_link"
+
+
+def test_other_machines_are_not_let_in_without_a_token(folder: Path):
+    words = ("serve", folder / "estimate.json", "--rate", RATE, "--no-page")
+    refused = run_tauhat(*words, "--host", "0.0.0.0")  # noqa: S104
+    assert refused.exit_code == 1
+    assert refused.stderr.startswith("error: host 0.0.0.0: other machines could connect, and there is no token")
+    secret = folder / "token"
+    secret.write_text(TOKEN)
+    secret.chmod(0o644)
+    assert "others may read the token" in run_tauhat(*words, "--token-file", secret).stderr
+
+
+def test_what_cannot_be_served_is_an_error_in_a_line(folder: Path):
+    absent = run_tauhat("serve", folder / "absent.json", "--rate", RATE, "--no-page")
+    assert (absent.exit_code, absent.stderr.count("\n")) == (1, 1)
+    (folder / "notes.txt").write_text("mine")
+    taken = run_tauhat("serve", folder / "estimate.json", "--rate", RATE, "--no-page", "--pipe", folder / "notes.txt")
+    assert (taken.exit_code, taken.stderr.count("\n")) == (1, 1)
+    assert "no socket is not replaced" in taken.stderr
