@@ -86,7 +86,9 @@ def test_the_study_tries_every_observer_on_every_log(found):
         assert all(0.0 < value < 60.0 for value in row[1:])
     shares = np.array([row[1:] for row in chapters[2].tables[0].rows])
     assert ((shares > 50.0) & (shares <= 100.0)).all()
-    ((_, without, with_warmth, ratio),) = chapters[3].tables[0].rows
+    for row in chapters[3].tables[0].rows:
+        assert 0.0 < min(row[1:]) < max(row[1:]) <= 100.0
+    ((_, without, with_warmth, ratio, _),) = chapters[4].tables[0].rows
     assert with_warmth < without
     assert ratio == pytest.approx(with_warmth / without)
     assert "1 arms" in summary_of(found)
@@ -104,6 +106,10 @@ def test_figures_are_those_of_a_sensor_used_by_hand(scene, sensor, found):
     error = np.linalg.norm(sensed.wrench[later, :3] - log.force[150:-6], axis=1)
     assert outcome.force_rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-9)
     assert outcome.force_95 == pytest.approx(np.quantile(error, 0.95), rel=1e-9)
+    apart = replace(by_hand, wrench=replace(by_hand.solver, correlation=np.eye(6))).along(log.recording)
+    without = np.linalg.norm(apart.wrench[later, :3] - log.force[150:-6], axis=1)
+    assert outcome.apart_rms == pytest.approx(np.sqrt(np.mean(without**2)), rel=1e-6)
+    assert outcome.apart_rms != outcome.force_rms
 
 
 @pytest.mark.parametrize(

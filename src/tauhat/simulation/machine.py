@@ -12,6 +12,9 @@ from tauhat.simulation.laws import SharedDrive
 from tauhat.simulation.laws.program import Program, compiled, initial_memory
 from tauhat.simulation.native import NativeFunctions
 from tauhat.simulation.parameters import TrueParameters
+from tauhat.simulation.touch_kernel import ELSEWHERE, SLIDES, TURNS
+
+_SLIDE = 2  # MuJoCo's number of a joint that slides, `mjJNT_SLIDE`
 
 
 class Engine(NamedTuple):
@@ -20,6 +23,9 @@ class Engine(NamedTuple):
     step, forward, implicit : addresses of the functions; zero without native ones
     model, data : addresses of what they take
     dof : (n_v,) index of each joint of the robot among MuJoCo's
+    touch : (TOUCH_SIZE,) the contact sensor, of `touch_kernel`; empty where nothing can touch
+    carriers : (n_v,) what each joint is to the body that touches
+    axes, anchors : (n_joints, 3) of MuJoCo's joints, in base axes, at the last step's begin
     """
 
     step: int
@@ -34,6 +40,10 @@ class Engine(NamedTuple):
     applied: FloatArray
     smooth: FloatArray
     constraint: FloatArray
+    touch: FloatArray
+    carriers: IntArray
+    axes: FloatArray
+    anchors: FloatArray
     damping: FloatArray
     dryness: FloatArray
 
@@ -197,9 +207,24 @@ def engine_of(model: Any, data: Any, dof: IntArray, native: NativeFunctions | No
         applied=data.qfrc_applied,
         smooth=data.qfrc_smooth,
         constraint=data.qfrc_constraint,
+        touch=data.sensordata,
+        carriers=_carriers(model, dof),
+        axes=data.xaxis,
+        anchors=data.xanchor,
         damping=model.dof_damping,
         dryness=model.dof_frictionloss,
     )
+
+
+def _carriers(model: Any, dof: IntArray) -> IntArray:
+    """Return what each joint is to the body whose contact the model's sensor tells, (n_v,)."""
+    carriers = np.full(dof.size, ELSEWHERE, dtype=np.intp)
+    body = int(model.geom_bodyid[model.sensor_objid[0]]) if model.nsensor else 0
+    while body > 0:
+        own = model.dof_bodyid[dof] == body
+        carriers[own] = np.where(model.jnt_type[dof[own]] == _SLIDE, SLIDES, TURNS)
+        body = int(model.body_parentid[body])
+    return carriers
 
 
 def machine_of(truth: TrueParameters, engine: Engine, timestep: float) -> Machine:

@@ -59,7 +59,7 @@ def reference_step(simulator: Simulator, machine: Machine, x: FloatArray, laws: 
     moving = driven + x[r.EXTERNAL] + x[r.SLOPE] * x[r.DQ]
     engine.applied[engine.dof] = np.where(rigid, moving, x[r.GEAR] - x[r.SPRING] + x[r.EXTERNAL])
     speed = _pass(simulator, machine, x, found)
-    _react(machine, x, found, rigid)
+    _react(machine, x, found, np.where(rigid, _dry_friction(simulator)[engine.dof], x[r.DRY]))
     _remember(machine, x, found, speed, laws)
 
 
@@ -123,15 +123,25 @@ def _pass(simulator: Simulator, machine: Machine, x: FloatArray, found: _Found) 
     return speeds
 
 
-def _react(machine: Machine, x: FloatArray, found: _Found, rigid: NDArray[np.bool_]) -> None:
+def _dry_friction(simulator: Simulator) -> FloatArray:
+    """Return the torque of dry friction on MuJoCo's joints, (model.nv,): that of its own rows among the constraints."""
+    mujoco, model, data = simulator
+    rows = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
+    dry = np.zeros(model.nv)
+    dry[data.efc_id[rows]] = -data.efc_force[rows]
+    return dry
+
+
+def _react(machine: Machine, x: FloatArray, found: _Found, dry: FloatArray) -> None:
     """Note the accelerations and torques at the begin of the step."""
     engine, drives = machine.engine, machine.drives
+    rigid = drives.stiffness == 0.0
     x[r.DDQ] = engine.qacc[engine.dof]
     own = found.viscous * x[r.MOTOR_DQ]
     coupled = (drives.shared * x[r.DDQ]).sum(axis=1)  # row by row, as the kernel adds
     x[r.LAW] = x[r.FRICTION] + x[r.SPRING] + coupled + (own - drives.viscous * x[r.MOTOR_DQ])
     x[r.MOTOR_DDQ] = np.where(rigid, x[r.DDQ], x[r.MOTOR_DDQ])
-    x[r.DRY] = np.where(rigid, -engine.constraint[engine.dof], x[r.DRY])
+    x[r.DRY] = dry
     taken = x[r.FRICTION] + x[r.DRY] + own + drives.rotor * x[r.DDQ] + coupled
     x[r.GEAR] = np.where(rigid, x[r.TAU] - drives.offset - taken, x[r.GEAR])
     x[r.LOAD] = np.where(rigid, np.abs(x[r.GEAR] - x[r.SPRING]), x[r.LOAD])

@@ -23,6 +23,7 @@ from numba import njit
 from tauhat.simulation import rows as r
 from tauhat.simulation.laws.program_kernel import add_law, advance_law, on_the_link
 from tauhat.simulation.native_kernel import call_native
+from tauhat.simulation.touch_kernel import force_on_tool, push_on_joint
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -168,6 +169,7 @@ def _react(engine, d, x):  # type: ignore[no-untyped-def]
     """Note what the step found at its begin: accelerations, and the torques that balance there."""
     for j in range(x.shape[1]):
         x[r.DDQ, j] = engine.qacc[engine.dof[j]]
+    force = force_on_tool(engine.touch)
     for j in range(x.shape[1]):
         own, coupled = x[r.VISCOUS, j] * x[r.MOTOR_DQ, j], 0.0
         for m in range(x.shape[1]):
@@ -176,7 +178,7 @@ def _react(engine, d, x):  # type: ignore[no-untyped-def]
         x[r.LAW, j] = x[r.FRICTION, j] + x[r.SPRING, j] + coupled + warm
         if d[r.STIFFNESS, j] == 0.0:
             x[r.MOTOR_DDQ, j] = x[r.DDQ, j]
-            x[r.DRY, j] = -engine.constraint[engine.dof[j]]
+            x[r.DRY, j] = push_on_joint(engine, force, j) - engine.constraint[engine.dof[j]]
             taken = x[r.FRICTION, j] + x[r.DRY, j] + own + d[r.ROTOR, j] * x[r.DDQ, j] + coupled
             x[r.GEAR, j] = x[r.TAU, j] - d[r.OFFSET, j] - taken
             # The load that friction sees in the next step is what this one's equation of motion leaves for the links.

@@ -5,9 +5,6 @@
     tau(k) = clip(feedforward + kp (q_ref - q) + kd (dq_ref - dq))(k - delay)
 
 The controller acts at the end of every control period; its last torque is the one that starts with the next sample.
-
-MuJoCo's contact sensor tells the force f of the tip on the workpiece along the normal n, which points out of the tip,
-and two tangents: the force on the tool is `-(f0 n + f1 t + f2 n x t)`.
 """
 
 from __future__ import annotations
@@ -17,9 +14,8 @@ from numba import njit
 from tauhat.simulation import rows as r
 from tauhat.simulation.loop_kernel import FINE, observe
 from tauhat.simulation.step_kernel import pass_step
+from tauhat.simulation.touch_kernel import FORCE, FOUND, force_on_tool
 
-# The contact sensor's numbers.
-FOUND, FORCE, NORMAL, TANGENT, TOUCH_SIZE = 0, 1, 4, 7, 10
 # What is added up over a sample period: force on the tool in base axes, normal force, steps; whether the last touched.
 FORCE_SUM, NORMAL_SUM, STEPS, TOUCHES, FELT_SIZE = 0, 3, 4, 5, 6
 # Rows of a guide, (n, n_v): references and feedforward at both ends of a sample period.
@@ -58,11 +54,9 @@ def _feel(touch, felt):  # type: ignore[no-untyped-def]
     if felt[TOUCHES] == 0.0:
         return
     felt[NORMAL_SUM] += touch[FORCE]
+    force = force_on_tool(touch)
     for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        cross = touch[NORMAL + a] * touch[TANGENT + b] - touch[NORMAL + b] * touch[TANGENT + a]
-        along = touch[FORCE] * touch[NORMAL + i] + touch[FORCE + 1] * touch[TANGENT + i] + touch[FORCE + 2] * cross
-        felt[FORCE_SUM + i] -= along
+        felt[FORCE_SUM + i] += force[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -9,6 +9,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.simulation import rows as r
+from tauhat.simulation import touch_kernel as t
 from tauhat.simulation.contact import contact_kernel as c
 from tauhat.simulation.contact.steering import Steering, Tally
 from tauhat.simulation.loop_kernel import FINE
@@ -38,12 +39,12 @@ def reference_sample(running: RunningPlant, steering: Steering, guide: FloatArra
 def _feel(tally: Tally) -> None:
     touch, felt = tally.touch, tally.felt
     felt[c.STEPS] += 1.0
-    felt[c.TOUCHES] = float(touch[c.FOUND] > 0.0)
+    felt[c.TOUCHES] = float(touch[t.FOUND] > 0.0)
     if felt[c.TOUCHES]:
-        normal, tangent = touch[c.NORMAL : c.NORMAL + 3], touch[c.TANGENT : c.TANGENT + 3]
+        normal, tangent = touch[t.NORMAL : t.NORMAL + 3], touch[t.TANGENT : t.TANGENT + 3]
         axes = np.array([normal, tangent, np.cross(normal, tangent)])
-        felt[c.NORMAL_SUM] += touch[c.FORCE]
-        felt[c.FORCE_SUM : c.FORCE_SUM + 3] -= touch[c.FORCE : c.FORCE + 3] @ axes
+        felt[c.NORMAL_SUM] += touch[t.FORCE]
+        felt[c.FORCE_SUM : c.FORCE_SUM + 3] -= touch[t.FORCE : t.FORCE + 3] @ axes
 
 
 def _warm(x: FloatArray, timestep: float, work: FloatArray) -> None:

@@ -9,12 +9,12 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.errors import SimulationError
 from tauhat.simulation.contact.cell import Cell
-from tauhat.simulation.contact.contact_kernel import TOUCH_SIZE
 from tauhat.simulation.contact.material import SkinConstraint, skin_constraint
 from tauhat.simulation.contact.tool import TIP
 from tauhat.simulation.contact.workpiece import WORKPIECE, add_workpiece, height
 from tauhat.simulation.plant import build_plant
 from tauhat.simulation.running import RunningPlant, started
+from tauhat.simulation.touch_kernel import TOUCH_SIZE
 
 SLIDE = "slide"
 """Name of the tip's joint, positive where the spring is pressed."""
@@ -112,7 +112,9 @@ def _add_contact(mujoco: Any, specification: Any, cell: Cell) -> None:
         name=_CONTACT, geomname1=TIP, geomname2=WORKPIECE, condim=3 if friction > 0.0 else 1,
         friction=[friction, friction, 0.0, 0.0, 0.0],
     )  # fmt: skip
-    told = (data.mjCONDATA_FOUND, data.mjCONDATA_FORCE, data.mjCONDATA_NORMAL, data.mjCONDATA_TANGENT)
+    told = (
+        data.mjCONDATA_FOUND, data.mjCONDATA_FORCE, data.mjCONDATA_POS, data.mjCONDATA_NORMAL, data.mjCONDATA_TANGENT,
+    )  # fmt: skip
     sensor = specification.add_sensor(
         name=_CONTACT, type=mujoco.mjtSensor.mjSENS_CONTACT, objtype=kinds, objname=TIP, reftype=kinds,
         refname=WORKPIECE,

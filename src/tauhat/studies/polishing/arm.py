@@ -17,6 +17,7 @@ from tauhat.excitation.trajectory import Trajectory
 from tauhat.robots.library import load_robot
 from tauhat.robots.robot import Robot
 from tauhat.simulation.contact.cell import Cell, in_the_air
+from tauhat.simulation.contact.material import Material
 from tauhat.simulation.contact.running_cell import start_cell
 from tauhat.simulation.contact.tool import CompliantTool
 from tauhat.simulation.parameters import TrueParameters
@@ -29,7 +30,7 @@ from tauhat.studies.polishing.work import Posture, Shape, WorkSettings, postures
 Warmth: TypeAlias = Literal["cold", "warm"]
 WARMTHS: tuple[Warmth, ...] = ("cold", "warm")
 _STREAM = 20261125
-_TRUTH, _SENSORS, _NOISE, _CHANGE, _SURFACE, _RUN = range(6)
+_TRUTH, _SENSORS, _NOISE, _CHANGE, _SURFACE, _RUN, _FRICTION = range(7)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +75,7 @@ class Arm:
         self.truth: TrueParameters = settings.plant.truth(self.described, difficulty, motion, self._rng(_TRUTH))
         self.sensors: SensorErrors = settings.plant.sensed_by(self.described, self._rng(_SENSORS))
         calibration = Cell(robot=self.described, parameters=self.truth, tool=settings.tool)
+        self._material = Material(friction=float(self._rng(_FRICTION).uniform(*settings.plant.tool_friction)))
         self.robot: Robot = calibration.robot_with_tip
         self._with_tip = calibration.truth_with_tip
         self._mount = ToolMount(frame=calibration.carrier.name, length=settings.tool.length)
@@ -96,7 +98,7 @@ class Arm:
         temperature = warm if scene.warmth == "warm" else np.full(truth.n_v, AMBIENT)
         return Cell(
             robot=self.described, parameters=at_temperature(truth, temperature), surface=self._real(scene),
-            tool=self.settings.tool, sensors=sensors, timestep=self.settings.timestep,
+            tool=self.settings.tool, material=self._material, sensors=sensors, timestep=self.settings.timestep,
         )  # fmt: skip
 
     def job(self, scene: Scene) -> Job:

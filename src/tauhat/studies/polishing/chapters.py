@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tauhat.studies.polishing.arm import WARMTHS
+from tauhat.studies.polishing.arm import WARMTHS, Warmth
 from tauhat.studies.polishing.findings import Findings, finished, spread
 from tauhat.studies.polishing.sensing_ways import LOAD_CELL, NO_WARMTH, OPEN_LOOP, WITH_WARMTH
 from tauhat.studies.polishing.trials import GLOBAL, LOCAL
@@ -116,9 +116,9 @@ def _forces(found: Findings, difficulty: Difficulty) -> Table:
     )
 
 
-def _bar(found: Findings, difficulty: Difficulty, warmth: str) -> Series:
+def _bar(found: Findings, difficulty: Difficulty, warmth: Warmth) -> Series:
     names = tuple(name for name in found.sensors(difficulty) if name != OPEN_LOOP)
-    figures = [spread(found.of(name, difficulty, warmth)) for name in names]  # type: ignore[arg-type]
+    figures = [spread(found.of(name, difficulty, warmth)) for name in names]
     return Series(
         name=f"{difficulty}, {warmth}", x=names, y=tuple(f.median for f in figures), low=tuple(f.low for f in figures),
         high=tuple(f.high for f in figures),
@@ -208,31 +208,22 @@ def _wins(found: Findings) -> str:
 
 def drawn_chapter(found: Findings) -> Chapter:
     """Return one arm's jobs, drawn."""
-    charts = []
-    for warmth in WARMTHS:
-        series = []
-        for job in found.drawn:
-            if job.warmth == warmth:
-                series.append(Series(name=f"{job.sensor}: true", x=job.t, y=job.true))
-                if job.sensor != LOAD_CELL:
-                    series.append(Series(name=f"{job.sensor}: read", x=job.t, y=job.read))
-        charts.append(
-            Chart(
-                title=f"One {warmth} arm, flat workpiece",
-                kind="lines",
-                x_title="time [s]",
-                y_title="normal force [N]",
-                series=tuple(series),
-                note="True force, and what the polisher read.",
-            )
-        )
+    charts = [_drawn(found, warmth) for warmth in WARMTHS]
     text = (
-        (
-            "The arm comes along the path in air and back, comes down slowly, presses, waits, feeds "
-            "there and back, and retracts. In air a good sensor reads nothing."
-        ),
+        "The arm comes along the path in air and back, comes down slowly, presses, waits, feeds there and back, and "
+        "retracts. In air a good sensor reads nothing.",
     )
     return Chapter(title="One arm at work", text=text, charts=tuple(charts))
+
+
+def _drawn(found: Findings, warmth: Warmth) -> Chart:
+    jobs = [job for job in found.drawn if job.warmth == warmth]
+    series = [Series(name=f"{job.sensor}: true", x=job.t, y=job.true) for job in jobs]
+    series += [Series(name=f"{job.sensor}: read", x=job.t, y=job.read) for job in jobs if job.sensor != LOAD_CELL]
+    return Chart(
+        title=f"One {warmth} arm, flat workpiece", kind="lines", x_title="time [s]", y_title="normal force [N]",
+        series=tuple(series), note="True force, and what the polisher read.",
+    )  # fmt: skip
 
 
 def shift_chapter(found: Findings, hours: float) -> Chapter:

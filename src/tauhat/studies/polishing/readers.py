@@ -105,29 +105,49 @@ class SensedReading(ForceReader):
         return memory, ForceReading(force, float(np.sqrt(self.normal @ found.covariance[0] @ self.normal)))
 
 
-def along_the_normal(sensor: ForceSensor, frame: str, *, friction: float) -> tuple[WrenchSolver, ...]:
-    """Return solvers for one force along the tool's axis with friction against the feed: standing, forth and back.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolFriction:
+    """What is assumed of the friction between tool and workpiece.
 
-    Parameters
-    ----------
-    friction : assumed, tangential over normal force
+    part : tangential over normal force while the tool slides, against the feed
+    off : standard deviation of the tangential force beside that, in either direction, while it slides [N]
+    held : the same while it stands: anything up to the breakaway of friction [N]
     """
-    return tuple(_solver(sensor, frame, [[-way * friction, 0.0, -1.0, 0.0, 0.0, 0.0]]) for way in (0.0, 1.0, -1.0))
+
+    part: float = 0.2
+    off: float = 3.0
+    held: float = 6.0
+
+
+def along_the_normal(sensor: ForceSensor, frame: str, friction: ToolFriction) -> tuple[WrenchSolver, ...]:
+    """Return solvers for a force along the tool's axis with friction against the feed: standing, forth and back.
+
+    What friction may be beside that is solved for as well, but not believed to be large.
+    """
+    wide = WrenchSolver(robot=sensor.model.robot).largest[0]
+
+    def solver(way: float, off: float) -> WrenchSolver:
+        return _solver(sensor, frame, np.vstack([[-way * friction.part, 0.0, -1.0], np.eye(3)[:2]]), (wide, off, off))
+
+    return solver(0.0, friction.held), solver(1.0, friction.off), solver(-1.0, friction.off)
 
 
 def of_three_forces(sensor: ForceSensor, frame: str) -> tuple[WrenchSolver, ...]:
     """Return solvers for a force in any direction, the same whichever way the tool moves."""
-    return (_solver(sensor, frame, np.eye(6)[:3]),) * 3
+    return (_solver(sensor, frame, np.eye(3)),) * 3
 
 
 def of_all_components(sensor: ForceSensor, frame: str) -> tuple[WrenchSolver, ...]:
     """Return solvers for the whole wrench, the inverse Jacobian of a textbook, as far as joints tell it."""
-    return (_solver(sensor, frame, np.eye(6)),) * 3
+    return (
+        WrenchSolver(robot=sensor.model.robot, frame=frame, axes="frame", correlation=sensor.solver.correlation),
+    ) * 3
 
 
-def _solver(sensor: ForceSensor, frame: str, directions: Any) -> WrenchSolver:
-    columns = np.array(directions, dtype=np.float64).T
+def _solver(sensor: ForceSensor, frame: str, forces: FloatArray, sizes: tuple[float, ...] = ()) -> WrenchSolver:
+    """Return the solver for forces in these directions of the frame, (n, 3)."""
+    columns = np.vstack([forces.T, np.zeros((3, len(forces)))])
     return WrenchSolver(
         robot=sensor.model.robot, frame=frame, directions=columns / np.linalg.norm(columns, axis=0), axes="frame",
-        correlation=sensor.solver.correlation,
+        correlation=sensor.solver.correlation, sizes=np.array(sizes),
     )  # fmt: skip

@@ -21,16 +21,15 @@ from tauhat.studies.polishing.readers import (
     LoadCellReading,
     NoReading,
     SensedReading,
+    ToolFriction,
     along_the_normal,
     of_all_components,
     of_three_forces,
 )
 
-_ASSUMED = 0.2  # friction between tool and workpiece over normal force
-
 Solvers: TypeAlias = Callable[[ForceSensor], tuple[WrenchSolver, ...]]
 SOLVED: Mapping[str, Solvers] = {
-    "one direction": lambda sensor: along_the_normal(sensor, TIP, friction=_ASSUMED),
+    "one direction": lambda sensor: along_the_normal(sensor, TIP, ToolFriction()),
     "three forces": lambda sensor: of_three_forces(sensor, TIP),
     "six components": lambda sensor: of_all_components(sensor, TIP),
 }
@@ -64,6 +63,7 @@ LOAD_CELL, OPEN_LOOP = "load cell", "open loop"
 NO_WARMTH, WITH_WARMTH = "without warmth", "with warmth"
 WAYS: Mapping[str, Way] = {
     "textbook": Way(model=TEXTBOOK, solved="six components"),
+    "textbook, pass in air": Way(model=TEXTBOOK, solved="six components", air=True),
     NO_WARMTH: Way(model=STEADY),
     f"{NO_WARMTH}, pass in air": Way(model=STEADY, air=True),
     WITH_WARMTH: Way(model=THERMAL, observer="thermal"),

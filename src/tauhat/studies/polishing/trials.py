@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from tauhat.studies.polishing.work import SHAPES, Shape
 
 _INTERVAL = 1.96
 _DRAWN = 400  # points of a drawn job
+_SHOWN = LOAD_CELL, NO_WARMTH, WITH_WARMTH, "textbook, pass in air"
 GLOBAL, LOCAL = "whole room", "where the work is"
 
 
@@ -87,15 +89,13 @@ def tried(trial: Trial) -> tuple[tuple[Outcome, ...], tuple[Drawn, ...]]:
     models = arm.calibrated()
     outcomes: list[Outcome] = []
     drawn: list[Drawn] = []
-    for shape in SHAPES:
-        for warmth in WARMTHS:
-            bench = _Bench(arm, Scene(trial.seed, shape, warmth), models.warm)
-            extra = tuple(OTHERS) if trial.difficulty == "easy" and shape == "flat" else ()
-            for name in (LOAD_CELL, OPEN_LOOP, *WAYS, *extra):
-                outcome, log = bench.tried(name, models.estimates)
-                outcomes.append(outcome)
-                if trial.draw and shape == "flat" and name in {LOAD_CELL, NO_WARMTH, WITH_WARMTH, "textbook"}:
-                    drawn.append(_drawn(name, warmth, log))
+    for shape, warmth in product(SHAPES, WARMTHS):
+        bench = _Bench(arm, Scene(trial.seed, shape, warmth), models.warm)
+        extra = tuple(OTHERS) if trial.difficulty == "easy" and shape == "flat" else ()
+        jobs = {name: bench.tried(name, models.estimates) for name in (LOAD_CELL, OPEN_LOOP, *WAYS, *extra)}
+        outcomes += [outcome for outcome, _ in jobs.values()]
+        if trial.draw and shape == "flat":
+            drawn += [_drawn(name, warmth, jobs[name][1]) for name in _SHOWN]
     if trial.near is not None:
         outcomes += _local(arm, trial.near, models.estimates, models.warm)
     return tuple(outcomes), tuple(drawn)

@@ -38,6 +38,7 @@ class PlantSettings:
     stribeck : extra friction near standstill in parts of Coulomb friction, easy and hard
     length : of the bristles in parts of what the model assumes, easy and hard; spread by up to two either way
     sensors : preset of the sensors' errors
+    tool_friction : smallest and largest between tool and workpiece, over normal force
     wrong : standard deviation of what changed since calibration where it is hard: gravity of each link and the torque
         constant of each drive, in parts of one
     """
@@ -48,6 +49,7 @@ class PlantSettings:
     stribeck: tuple[float, float] = (0.1, 0.3)
     length: tuple[float, float] = (1.0, 3.0)
     sensors: str = "industrial-arm"
+    tool_friction: tuple[float, float] = (0.1, 0.3)
     wrong: float = 0.02
 
     def __post_init__(self) -> None:
