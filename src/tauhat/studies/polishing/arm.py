@@ -105,7 +105,9 @@ class Arm:
         """Return the job on the believed surface of a scene."""
         work, posture = self.settings.work, self._posture(scene)
         path = work.joints(self.robot, posture, work.believed(posture, scene.shape), self._mount)
-        return Job(polisher=Polisher(task=work.task, limits=work.limits), path=path, way_in=work.way_in)
+        polisher = Polisher(task=work.task, limits=work.limits)
+        polisher.check_path(path)
+        return Job(polisher=polisher, path=path, way_in=work.way_in)
 
     def air(self, scene: Scene, cell: Cell, job: Job) -> AirLog:
         """Return the log of the same motion in air, in the same cell and at the same temperature."""

@@ -23,7 +23,7 @@ def summary_of(found: Findings) -> str:
     return (
         f"{found.arms} arms ({found.arm.robot}) of each kind polish flat and curved workpieces with {task.force:g} N "
         f"at {1e3 * task.feed:g} mm/s, force known from motor torques alone. RMS error of the true "
-        f"normal force, median over jobs: {'; '.join(parts)}."
+        f"normal force, median over the jobs done to their end: {'; '.join(parts)}."
     )
 
 
@@ -56,8 +56,9 @@ def scene_chapter(found: Findings) -> Chapter:
         f"Easy arms have Stribeck friction of {100 * plant.stribeck[0]:g} % beside what the models have. Hard arms "
         f"have {100 * plant.stribeck[1]:g} %, bristles {plant.length[1]:g} times as long as the models "
         f"believe, friction by load, and since the calibration {100 * plant.wrong:g} % (one sigma) of "
-        f"every link's weight and every drive's torque constant have changed. Warm arms have lost "
-        f"{100 * plant.lost[0]:g} to {100 * plant.lost[1]:g} % of their friction."
+        f"every link's weight and every drive's torque constant have changed. Warm arms are as warm as "
+        f"the calibration leaves them; going on for long, it would take {100 * plant.lost[0]:g} to "
+        f"{100 * plant.lost[1]:g} % of their friction. A pass in air is made just before the job, as warm as it."
     )
     loop = (
         "A force law of 1 Hz moves the tool along the normal. The error counts while the tool is fed under full force, "
@@ -210,8 +211,10 @@ def drawn_chapter(found: Findings) -> Chapter:
     """Return one arm's jobs, drawn."""
     charts = [_drawn(found, warmth) for warmth in WARMTHS]
     text = (
-        "The arm comes along the path in air and back, comes down slowly, presses, waits, feeds there and back, and "
-        "retracts. In air a good sensor reads nothing.",
+        (
+            "The arm comes along the path in air and back, comes down slowly, presses, waits, feeds there and back, "
+            "and retracts. In air a good sensor reads nothing."
+        ),
     )
     return Chapter(title="One arm at work", text=text, charts=tuple(charts))
 
@@ -260,7 +263,8 @@ def shift_chapter(found: Findings, hours: float) -> Chapter:
     text = (
         (
             "The shift begins cold. A job is simulated every quarter of an hour; in between joints take "
-            "the heat of work or, in the break, cool, in one exact step. The virtual sensor starts again at every job."
+            "the heat of work or, in the break, cool, in one exact step. The virtual sensor starts again at every job; "
+            "the drives' torque sensors drift meanwhile."
         ),
     )
     return Chapter(title="A shift", text=text, tables=(table,), charts=charts)

@@ -78,9 +78,8 @@ class Job:
         rows: list[tuple[float, ...]] = []
         progress, most = 0.0, int(_LONGEST / polisher.period)
         while state.phase not in {"done", "stopped"} and len(rows) < most:
-            memory, reading, state, row = self._step(cell, reader, (memory, reading, state, progress))
-            progress += abs(row[-1]) * polisher.period
-            rows.append(row[:-1])
+            memory, reading, state, progress, row = self._step(cell, reader, (memory, reading, state, progress))
+            rows.append(row)
         t, s, depth, passing, true, read, std = np.array(rows).T
         return JobLog(t, s, depth, passing, true, read, std, state.phase, state.reason)
 
@@ -96,15 +95,16 @@ class Job:
         return AirLog(log, np.cumsum(speeds) * self.polisher.period)
 
     def _step(self, cell: RunningCell, reader: ForceReader, now: tuple[Any, Any, Any, float]) -> tuple[Any, ...]:
-        """Return what reader and polisher remember one period later, and a row of the log with the feed behind it."""
+        """Return what is remembered one period later, and a row of the log."""
         memory, reading, state, progress = now
         state, command = self.polisher.step(state, reading)
         sample = cell.advance(*self.path.follow(command))
+        progress += abs(command.ds) * self.polisher.period
         memory, reading = reader.read(memory, sample, Place(float(np.sign(command.ds)), progress))
         force, std = (np.nan, np.nan) if reading is None else reading
-        passing = float(command.phase == "pass")
-        row = (sample.t, command.s, command.depth, passing, sample.normal_force, force, std, command.ds)
-        return memory, reading, state, row
+        passing = float(state.phase == "pass")
+        row = (sample.t, command.s, command.depth, passing, sample.normal_force, force, std)
+        return memory, reading, state, progress, row
 
     def _way(self, cell: RunningCell, speed: float, *, passes: int) -> Iterator[tuple[CellSample, float]]:
         """Move there and back above the surface; yield the samples, with the speed along the path."""

@@ -37,7 +37,7 @@ class ShiftSettings:
     hours: float = 4.0
     every: float = 900.0
     rest: tuple[float, float] = (2.0, 2.5)
-    pace: float = 8.0
+    pace: float = 30.0
 
     @property
     def times(self) -> FloatArray:
@@ -81,15 +81,16 @@ def shift_of(trial: ShiftTrial) -> tuple[Worked, ...]:
         asked = replace(job, polisher=replace(job.polisher, source=source))
         running = start_cell(cell, job.beginning, rng=arm.rng_of_run(scene))
         for hour in trial.shift.times:
-            temperature = float(running.sample.temperature.mean())
+            began, temperature = running.sample.t, float(running.sample.temperature.mean())
             running.begin_work()
             log = asked.done_in(running, reader)
+            rest = trial.shift.every - (running.sample.t - began)
             blank = Outcome(seed=arm.seed, difficulty="easy", shape="flat", warmth="cold", sensor=name)
             done.append(Worked(float(hour), temperature, judged(blank, log, job.polisher.task.force)))
             power = running.friction_power
             if trial.shift.rests(hour):
-                running.rest(trial.shift.every)
+                running.rest(rest)
             else:
                 faster = power._replace(power=trial.shift.pace * power.power, slope=trial.shift.pace * power.slope)
-                running.worked(trial.shift.every, faster)
+                running.worked(rest, faster)
     return tuple(done)

@@ -33,8 +33,8 @@ class PlantSettings:
     """What the true arms are like.
 
     spread : of the parameters around the description
-    lost : smallest and largest part of a joint's friction that is gone when it is warm
-    time_constant : smallest and largest, of warming [s]
+    lost : smallest and largest part of a joint's friction that is gone in the end, when calibration goes on for long
+    time_constant : smallest and largest, of warming, easy and hard [s]
     stribeck : extra friction near standstill in parts of Coulomb friction, easy and hard
     length : of the bristles in parts of what the model assumes, easy and hard; spread by up to two either way
     sensors : preset of the sensors' errors
@@ -45,7 +45,7 @@ class PlantSettings:
 
     spread: float = 0.1
     lost: tuple[float, float] = (0.25, 0.35)
-    time_constant: tuple[float, float] = (250.0, 400.0)
+    time_constant: tuple[tuple[float, float], tuple[float, float]] = ((250.0, 400.0), (400.0, 900.0))
     stribeck: tuple[float, float] = (0.1, 0.3)
     length: tuple[float, float] = (1.0, 3.0)
     sensors: str = "industrial-arm"
@@ -55,8 +55,9 @@ class PlantSettings:
     def __post_init__(self) -> None:
         if not 0.0 <= self.lost[0] <= self.lost[1] < 1.0:
             raise SimulationError("friction lost by warmth", expected="two parts of one, in order", got=self.lost)
-        if not 0.0 < self.time_constant[0] <= self.time_constant[1] < np.inf:
-            raise SimulationError("time constants of warming", expected="two times, in order", got=self.time_constant)
+        for constant in self.time_constant:
+            if not 0.0 < constant[0] <= constant[1] < np.inf:
+                raise SimulationError("time constants of warming", expected="two times, in order", got=constant)
         if not 0.0 <= self.wrong < 0.5:
             raise SimulationError("what changed since calibration", expected="a part of one", got=self.wrong)
 
@@ -80,18 +81,20 @@ class PlantSettings:
         speed = top * rng.uniform(*_STRIBECK, n_v)
         fall = StribeckBump(torque=self.stribeck[hard] * given.coulomb, speed=speed, width=0.1 * speed)
         load = LoadedBristles(ratio=rng.uniform(*_LOAD, n_v), length=np.full(n_v, LENGTHS[0]))
-        heat = self._heat(given, motion, rng)
+        heat = self._heat(given, motion, self.time_constant[hard], rng)
         laws = (*given.laws, bristles, fall, *((load,) if hard else ()))
         slopes = np.tile(heat.coulomb, (len(laws), 1))
         return replace(given, coulomb=np.zeros(n_v), laws=laws, heat=replace(heat, laws=slopes))
 
-    def _heat(self, given: TrueParameters, motion: Trajectory, rng: np.random.Generator) -> FrictionHeat:
+    def _heat(
+        self, given: TrueParameters, motion: Trajectory, constants: tuple[float, float], rng: np.random.Generator
+    ) -> FrictionHeat:
         dq = np.abs(motion.sample(np.linspace(0.0, motion.duration, _SAMPLES)).dq)
         power = np.mean(dq * (given.coulomb + given.viscous * dq), axis=0)
-        constant = rng.uniform(*self.time_constant, given.n_v)
-        slope = -rng.uniform(*self.lost, given.n_v) / _RISE
+        constant, lost = rng.uniform(*constants, given.n_v), rng.uniform(*self.lost, given.n_v)
+        slope, left = -lost / _RISE, 1.0 - lost  # what is left of the friction heats in the end
         return FrictionHeat(
-            heating=_RISE / (np.maximum(power, _SETTLED) * constant), time_constant=constant, viscous=slope,
+            heating=_RISE / (left * np.maximum(power, _SETTLED) * constant), time_constant=constant, viscous=slope,
             coulomb=slope, initial=np.full(given.n_v, AMBIENT), laws=np.zeros((0, given.n_v)), ambient=AMBIENT,
             reference=AMBIENT,
         )  # fmt: skip
