@@ -90,7 +90,7 @@ class LiveServer:
             self.addresses["pipe"] = f"unix:{wanted.pipe}"
         if wanted.udp is not None:
             self._udp = UdpServer(self.clients, access)
-            self.addresses["udp"] = f"udp://{shown}:{await self._udp.start(wanted.udp)}"
+            self.addresses["udp"] = f"udp://{shown}:{self._udp.start(wanted.udp)}"
         if wanted.websocket is not None:
             from tauhat.live.websocket_server import serve_websocket
 

@@ -2,7 +2,10 @@
 
 Whoever sends datagrams can write any address on them. So an address that has not said the token gets no answer at all,
 and no small datagram makes the server send much to an address: only samples of a known client are answered, one for
-one. An address is a client from its first datagram on until it has been silent for the idle time.
+one. An address is a client from its first datagram on until it says that it ends, or has been silent for the idle time.
+
+All clients share one socket. When more comes in than the server can answer, the system drops datagrams, whoever sent
+them: a stream that must lose nothing beside others belongs on another channel.
 """
 
 from __future__ import annotations
@@ -18,12 +21,13 @@ from tauhat.live.protocol import decoded, refusal_text
 from tauhat.live.throttle import Throttle
 
 _STRANGERS = 10_000.0  # datagrams a second of unknown addresses that are looked into
-_KERNEL = 2**20  # [bytes] of datagrams that the system may hold while the server is busy
+_KERNEL = 2**20  # [bytes] of datagrams that the system is asked to hold while the server is busy
+_IN_A_ROW = 16  # datagrams, before others have their turn
 
 _Address: TypeAlias = tuple[Any, ...]
 
 
-class UdpServer(asyncio.DatagramProtocol):
+class UdpServer:
     """Datagrams in, datagrams out.
 
     Parameters
@@ -38,10 +42,10 @@ class UdpServer(asyncio.DatagramProtocol):
         self._known: dict[_Address, Client] = {}
         self._strangers = Throttle(_STRANGERS)
         self._loop = asyncio.get_running_loop()
-        self._transport: asyncio.DatagramTransport | None = None
-        self._is_paused = False
+        self._socket: socket.socket | None = None
+        self._held: tuple[str, _Address] | None = None  # what the system did not take
 
-    async def start(self, port: int) -> int:
+    def start(self, port: int) -> int:
         """Listen at a port, 0 for any that is free; return which.
 
         Raises
@@ -49,41 +53,45 @@ class UdpServer(asyncio.DatagramProtocol):
         LiveError
             when it cannot be had.
         """
-        address = (self._access.host, port)
+        host = self._access.host
         try:
-            transport, _ = await self._loop.create_datagram_endpoint(lambda: self, local_addr=address)
+            family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            self._socket = socket.socket(family, socket.SOCK_DGRAM)
+            self._socket.bind(address)
         except OSError as error:
-            raise LiveError("cannot listen for datagrams", where=f"{address[0]}:{port}", got=str(error)) from error
-        bound: socket.socket = transport.get_extra_info("socket")
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _KERNEL)
-        return cast("int", bound.getsockname()[1])
+            self.close()
+            raise LiveError("cannot listen for datagrams", where=f"{host}:{port}", got=str(error)) from error
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _KERNEL)
+        self._loop.add_reader(self._socket, self._read, self._socket)
+        return cast("int", self._socket.getsockname()[1])
 
     def close(self) -> None:
         """Forget all clients and stop listening."""
         for address in list(self._known):
             self._forget(address)
-        if self._transport is not None:
-            self._transport.close()
+        if self._socket is not None:
+            self._loop.remove_reader(self._socket)
+            self._loop.remove_writer(self._socket)
+            self._socket.close()
+            self._socket = None
 
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Answer over this transport from now on."""
-        self._transport = cast("asyncio.DatagramTransport", transport)
-        cast("Any", transport).set_write_buffer_limits(high=self._clients.service.limits.buffer)
+    def _read(self, listening: socket.socket) -> None:
+        """Answer the datagrams that are there, a few at a time."""
+        longest = self._clients.service.limits.message + 1  # one that is longer is cut off, and no message either way
+        for _ in range(_IN_A_ROW):
+            try:
+                data, address = listening.recvfrom(longest)
+            except BlockingIOError:
+                return
+            except OSError:
+                continue  # an earlier answer did not arrive
+            self._receive(data, address)
 
-    def pause_writing(self) -> None:
-        """Let answers wait: the system takes no more."""
-        self._is_paused = True
-
-    def resume_writing(self) -> None:
-        """Send what waits."""
-        self._is_paused = False
-        for address, client in self._known.items():
-            self._flush(address, client)
-
-    def datagram_received(self, data: bytes, addr: _Address) -> None:
+    def _receive(self, data: bytes, address: _Address) -> None:
         """Answer a datagram, or look whether it lets its address in."""
         now = self._loop.time()
-        client = self._known.get(addr) or self._newcomer(data, addr, now)
+        client = self._known.get(address) or self._newcomer(data, address, now)
         if client is None:
             return
         client.heard = now
@@ -91,8 +99,8 @@ class UdpServer(asyncio.DatagramProtocol):
             client.session.slowed(now, lost=1)
         else:
             client.throttle.take(now)
-            self._answer(client, data, addr, now)
-        self._flush(addr, client)
+            self._answer(client, data, address, now)
+        self._flush(address, client)
 
     def _answer(self, client: Client, data: bytes, address: _Address, now: float) -> None:
         try:
@@ -126,9 +134,27 @@ class UdpServer(asyncio.DatagramProtocol):
             self._clients.leave(client)
 
     def _flush(self, address: _Address, client: Client) -> None:
-        while not self._is_paused and (text := client.outbox.take(self._loop.time())) is not None:
+        while self._held is None and (text := client.outbox.take(self._loop.time())) is not None:
             self._send(text, address)
 
     def _send(self, text: str, address: _Address) -> None:
-        if self._transport is not None and not self._transport.is_closing():
-            self._transport.sendto(text.encode(), address)
+        """Send a datagram, or hold it, and all that come after it, until the system takes it."""
+        if self._socket is None:
+            return
+        try:
+            self._socket.sendto(text.encode(), address)
+        except BlockingIOError:
+            if self._held is None:
+                self._held = (text, address)
+                self._loop.add_writer(self._socket, self._resume, self._socket)
+        except OSError:
+            return  # nobody can be reached there
+
+    def _resume(self, listening: socket.socket) -> None:
+        """Send what was held and what waits behind it."""
+        self._loop.remove_writer(listening)
+        held, self._held = self._held, None
+        if held is not None:
+            self._send(*held)
+        for address, client in list(self._known.items()):
+            self._flush(address, client)

@@ -142,8 +142,8 @@ def _together(found: Findings) -> Chapter:
             row += [100.0 * mean(outcomes, "apart_inside"), 100.0 * mean(outcomes, "force_inside")]
         rows.append(tuple(row))
     words = (
-        "One wrong mass or one temperature is felt by several joints. `Together` weights them by the correlation that "
-        "the work in air showed, as everywhere else on this page; `apart` takes each joint for itself."
+        "One wrong mass or one temperature is felt by several joints. Together: weighted by the correlation that "
+        "the work in air showed, as everywhere else on this page. Apart: each joint for itself."
     )
     told = "apart: RMS [N]", "together: RMS [N]", "apart: inside [%]", "together: inside [%]"
     return Chapter(

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tauhat.studies.polishing.arm import ArmSettings, Warmth
+from tauhat.studies.polishing.meeting import Met
 from tauhat.studies.polishing.shift import Worked
 from tauhat.studies.polishing.trials import GLOBAL, Drawn, Outcome
 from tauhat.studies.polishing.truth import Difficulty
@@ -27,12 +28,14 @@ class Findings:
     """What became of all jobs.
 
     worked : jobs of shifts
+    met : incidents
     drawn : jobs of one arm to be drawn
     """
 
     arm: ArmSettings
     outcomes: tuple[Outcome, ...]
     worked: tuple[Worked, ...] = ()
+    met: tuple[Met, ...] = ()
     drawn: tuple[Drawn, ...] = ()
 
     @property

@@ -43,7 +43,7 @@ OF_THE_SAMPLES: tuple[Incident, ...] = (
     Replaced(name="every other torque is no number", ends=_MISSING, by_load_cell=_INVALID, value=np.nan, good=1),
     Replaced(name="one torque in twenty is no number", ends=_DONE, value=np.nan, good=19),
     Scattered(name="random torque of 100 Nm", ends=_TOO_MUCH, width=100.0),
-    Scattered(name="five random samples in fifty", ends=_TOO_MUCH, width=100.0, bad=5, good=45),
+    Scattered(name="five random samples in fifty", ends=_TOO_MUCH + _DONE, width=100.0, bad=5, good=45),
     Scattered(name="noise of 10 Nm", ends=_DONE, width=10.0, about=1.0),
     Negated(name="torque of the other sign", ends=_TOO_MUCH, by_load_cell=_LOST),
     Negated(name="torque of the other sign on the way down", ends=_TOO_MUCH, moment="approach"),

@@ -97,9 +97,9 @@ class Bench:
     """An arm on which incidents are tried, each in the same run of everything else.
 
     sensor, warmth : what the polisher reads, and how warm the arm is
-    job, reader, believed : what is done, on which surface as believed
+    cell : in which nothing goes wrong
+    job, reader, believed : what is done, what reads the force, and the surface as believed
     rng : of the sensors, the same at every call
-    healthy : the job without incidents
     """
 
     sensor: str

@@ -11,8 +11,11 @@ from tauhat.excitation.trajectory import Trajectory
 from tauhat.robots.library import load_robot
 from tauhat.simulation.contact.cell import Cell
 from tauhat.studies.polishing import chapters
+from tauhat.studies.polishing.accidents import Accidents, all_met
 from tauhat.studies.polishing.arm import ArmSettings
 from tauhat.studies.polishing.findings import Findings
+from tauhat.studies.polishing.incident_chapter import incident_chapter
+from tauhat.studies.polishing.meeting import Met
 from tauhat.studies.polishing.motions import MotionSettings, over_and_over, where_the_work_is, whole_room
 from tauhat.studies.polishing.shift import ShiftSettings, ShiftTrial, Worked, shift_of
 from tauhat.studies.polishing.trials import Drawn, Outcome, Trial, tried
@@ -35,6 +38,7 @@ class PolishingStudy(Study):
     shift : how long a shift is, and what is done in it
     shifts : arms that work one
     local : arms that are calibrated where the work is, too
+    accidents : arms with which everything goes wrong
     """
 
     key: ClassVar[str] = "polishing"
@@ -49,6 +53,7 @@ class PolishingStudy(Study):
     shift: ShiftSettings = field(default_factory=ShiftSettings)
     shifts: int = 2
     local: int = 10
+    accidents: int = 1
 
     def __post_init__(self) -> None:
         if self.seeds < 1 or not self.difficulties:
@@ -64,6 +69,7 @@ class PolishingStudy(Study):
         told += [chapters.shapes_chapter(found), chapters.others_chapter(found)]
         told += [chapters.local_chapter(found)] if self.local else []
         told += [chapters.shift_chapter(found, self.shift.hours)] if self.shifts else []
+        told += [incident_chapter(found.met)] if self.accidents else []
         return StudyResult(
             name=self.key, title=f"{self.title}: {self.arm.robot}", summary=chapters.summary_of(found),
             chapters=tuple(told), settings={"seeds": self.seeds, **asdict(self.arm)},
@@ -83,8 +89,10 @@ class PolishingStudy(Study):
             outcomes += found
             drawn += shown
             tell(f"{number} of {len(trials)} arms")
-        worked = self._worked(workers, motion, tell)
-        return Findings(arm=self.arm, outcomes=tuple(outcomes), worked=worked, drawn=tuple(drawn))
+        return Findings(
+            arm=self.arm, outcomes=tuple(outcomes), worked=self._worked(workers, motion, tell),
+            met=self._met(workers, motion, tell), drawn=tuple(drawn),
+        )  # fmt: skip
 
     def _trials(self, motion: Trajectory, near: Trajectory | None) -> list[Trial]:
         return [
@@ -114,3 +122,12 @@ class PolishingStudy(Study):
             worked += found
             tell(f"{number} of {len(trials)} shifts")
         return tuple(worked)
+
+    def _met(self, workers: Workers, motion: Trajectory, tell: Callable[[str], None]) -> tuple[Met, ...]:
+        seeds = range(self.first_seed, self.first_seed + self.accidents)
+        trials = [Accidents(settings=self.arm, seed=seed, motion=motion) for seed in seeds]
+        met: list[Met] = []
+        for number, found in enumerate(workers.map(all_met, trials), start=1):
+            met += found
+            tell(f"incidents of {number} of {len(trials)} arms")
+        return tuple(met)
