@@ -18,6 +18,7 @@ from tauhat.recordings import read_recording
 
 
 def main() -> None:
+    """Replay the log that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("address")
     parser.add_argument("log", type=Path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import runpy
 import signal
 import subprocess
 import sys
@@ -11,14 +12,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from live_server import TOKEN
+from live_server import TOKEN, running
 from typer.testing import CliRunner, Result
 
 from tauhat.cli.app import app
-from tauhat.live import Sender
+from tauhat.estimation import load_estimate
+from tauhat.live import Sender, Service
 from tauhat.recordings import read_recording
+from tauhat.sensing import force_sensor
 
 RATE = 250
+ROOT = Path(__file__).parents[2]
 
 
 def run_tauhat(*words: object) -> Result:
@@ -59,6 +63,16 @@ def test_samples_are_answered_until_sigterm_and_nothing_is_left_behind(folder: P
     assert errors == "done: 3 clients, 400 taken\n"
     assert not (folder / "s").exists()
     assert document["robot"] == "two_link"
+
+
+def test_the_example_replays_a_log(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    service = Service(sensor=force_sensor(load_estimate(folder / "estimate.json"), rate=RATE))
+    with running(folder, service=service) as served:
+        words = [served.addresses["udp"], str(folder / "log.parquet"), "--speed", "inf"]
+        monkeypatch.setattr(sys, "argv", ["replay.py", *words])
+        runpy.run_path(str(ROOT / "examples" / "live" / "replay.py"), run_name="__main__")
+    n_t = read_recording(folder / "log.parquet").n_t
+    assert capsys.readouterr().out.startswith(f"{n_t} of {n_t} samples answered, largest force ")
 
 
 def test_other_machines_are_not_let_in_without_a_token(folder: Path):

@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+
 from tauhat.errors import LiveError
 from tauhat.live.connection import connect
 from tauhat.recordings.log import Log
@@ -18,6 +20,8 @@ _KEPT = 1000  # notices
 _QUIET = 2.0  # [s] without an answer after which those that are missing are no longer waited for
 _AHEAD = 64  # samples without an answer before the next is sent
 _NAP = 0.05  # [s]
+_BURST = 0.02  # [s] of samples that may be made up for at once
+_CLOSER, _ASSUMED = 1.1, 1000.0  # of the gap that the server grants; messages a second before it has said
 
 
 class Sender:
@@ -103,7 +107,7 @@ class Sender:
         Parameters
         ----------
         log : position and torque
-        speed : times as fast as it was recorded; inf for as fast as answers come
+        speed : times as fast as it was recorded; inf for as fast as the server grants
 
         Raises
         ------
@@ -115,22 +119,24 @@ class Sender:
         times = log.t.tolist()
         place = {t: number for number, t in enumerate(times)}
         rows = zip(times, log.q.tolist(), log.tau.tolist(), strict=True)
-        started = latest = time.monotonic()
-        due = [started + (t - times[0]) / speed for t in times]
+        begin = latest = free = time.monotonic()
         sent = answered = 0
         while sent < len(times) or answered < len(times):
-            now = time.monotonic()
-            while sent < len(times) and due[sent] <= now and sent - answered < _AHEAD:
+            now, due = time.monotonic(), np.inf
+            if sent < len(times) and sent - answered < _AHEAD:
+                due = max(begin + (times[sent] - times[0]) / speed, free)
+            if due <= now:
                 self.send(*next(rows))
-                sent, latest = sent + 1, now
-            found = self.answers(_pause(due, sent, now) if sent - answered < _AHEAD else _NAP)
+                sent, latest, free = sent + 1, now, max(free, now - _BURST) + self._gap
+                continue
+            found = self.answers(min(_NAP, due - now))
             for answer in found:
                 answered, latest = max(answered, place.get(answer["t"], -1) + 1), now
                 yield answer
             if not found and now - latest > _QUIET:
                 answered = sent
 
-
-def _pause(due: Sequence[float], sent: int, now: float) -> float:
-    """Return how long to wait for answers before the next sample is due [s]."""
-    return min(_NAP, max(0.0, due[sent] - now)) if sent < len(due) else _NAP
+    @property
+    def _gap(self) -> float:
+        """Least time between samples [s]: a little more than the server grants, which it tells in its greeting."""
+        return _CLOSER / float(self.hello.get("messages_a_second", _ASSUMED))

@@ -6,6 +6,7 @@ import asyncio
 import gc
 import signal
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
@@ -63,11 +64,10 @@ class LiveServer:
         self._chores: list[asyncio.Task[None]] = []
 
     async def __aenter__(self) -> Self:
-        try:
+        async with AsyncExitStack() as unless_started:
+            unless_started.push_async_callback(self.close)
             await self._start()
-        except BaseException:
-            await self.close()
-            raise
+            unless_started.pop_all()
         return self
 
     async def __aexit__(self, *_: object) -> None:

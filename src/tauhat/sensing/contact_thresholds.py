@@ -32,7 +32,7 @@ from tauhat.recordings.recording import Recording
 from tauhat.sensing.contact_kernel import MOVING, RESTING, ROWS, SETTLING, STATES, judge_along
 from tauhat.sensing.contact_rules import ContactRules
 from tauhat.sensing.free_logs import sensed_free
-from tauhat.sensing.learnt_error import LearntError, error_of
+from tauhat.sensing.learnt_error import LearntError, error_of, learnt_error
 from tauhat.sensing.sensed_log import SensedLog
 from tauhat.sensing.sensor import ForceSensor
 from tauhat.sensing.zero import AirPass, StandingZero
@@ -100,7 +100,7 @@ class ContactThresholds:
         Raises
         ------
         SensingError
-            when the sensor has other joints.
+            when the sensor has other joints, or observes or filters otherwise.
         """
         self.check_joints(sensor.model.robot.joint_names, where="sensor")
         return sensor if self.error is None else self.error.on(sensor)
@@ -179,7 +179,7 @@ def _from_dict(data: dict[str, Any]) -> ContactThresholds:
         promised=_endless(data["promised"]),
         seconds=np.array([data["seconds"][name] for name in CONDITIONS], dtype=np.float64),
         spread=np.nan if data["spread"] is None else float(data["spread"]),
-        error=LearntError(**data["error"]) if data.get("error") else None,
+        error=learnt_error(data["error"]) if data.get("error") else None,
         taken_off=data.get("taken_off", "nothing"),
     )  # fmt: skip
 

@@ -105,9 +105,10 @@ def shrunk_correlation(parts: Sequence[FloatArray]) -> FloatArray:
 
 def _parts(free: Sequence[SensedLog]) -> list[FloatArray]:
     """Return sensed torque in parts of its standard error, (n, n_v), log by log; a few logs are cut."""
-    least = 1 if len(free) >= _FEWEST_PARTS else -(-_FEWEST_PARTS // len(free))
+    telling = [log for log in free if log.settled.any()]
+    least = 1 if len(telling) >= _FEWEST_PARTS else -(-_FEWEST_PARTS // len(telling))
     parts: list[FloatArray] = []
-    for log in free:
+    for log in telling:
         rows = log.tau[log.settled] / np.maximum(log.tau_std[log.settled], _TINY)
         cuts = 1 if least == 1 else max(least, int(len(rows) * log.step / _PART))
         parts += [part for part in np.array_split(rows, cuts) if len(part)]

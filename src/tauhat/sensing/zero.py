@@ -125,12 +125,13 @@ def without_air(sensed: SensedLog, air: AirPass, *, solver: WrenchSolver) -> Sen
     apart = np.abs(sensed.q - _at(air.progress, _positions(air), progress)).max(axis=1)
     elsewhere = sensed.settled & (apart > _SAME_PLACE)
     during = sensed.settled & (progress >= air.progress[0]) & (progress <= air.progress[-1])
-    share = float((elsewhere & during).sum() / max(1.0, float(during.sum())))
+    share = float((elsewhere & during).sum() / during.sum()) if during.any() else 1.0
     if share > _ELSEWHERE:
         raise SensingError(
             "not the motion of the pass in air", where=sensed.name,
             expected=f"positions within {_SAME_PLACE:g} rad or m, logs that begin within {_APART:g} s of each other",
-            got=f"{100.0 * share:.0f} % of the samples within the pass elsewhere", remedy="log the same motion in air",
+            got=f"{100.0 * share:.0f} % of the samples within the pass elsewhere" if during.any() else "none within it",
+            remedy="log the same motion in air",
         )  # fmt: skip
     found = zeroed(sensed, air.torque_at(progress), solver=solver)
     return replace(found, settled=sensed.settled & ~elsewhere)
