@@ -122,6 +122,16 @@ def test_one_log_is_cut_into_parts_and_a_joint_without_error_is_taken_too():
     assert (np.abs(learnt.solver.correlation[1]) <= 1.0).all()
 
 
+def test_logs_that_end_before_their_start_is_forgotten_teach_nothing():
+    q, tau = motion(MODEL.robot, 15.0, RATE)
+    slow = np.sin(0.7 * np.arange(1500)[:, None] / RATE + np.arange(7)) * SIZES
+    long = Recording(t=np.arange(1500) / RATE, q=q, tau=tau + slow)
+    short = Recording(t=T[:20], q=Q[:20], tau=TAU[:20])
+    alone, beside = (learnt_from_free_motion(SENSOR, given) for given in ([long], [long, short, short, short]))
+    assert (beside.model.stretch == alone.model.stretch).all()
+    assert (beside.solver.correlation == alone.solver.correlation).all()
+
+
 def test_what_was_learnt_before_does_not_change_what_is_learnt():
     once = learnt_from_free_motion(SENSOR, logs(30, 6))
     twice = learnt_from_free_motion(once, logs(30, 6))

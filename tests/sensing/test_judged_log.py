@@ -10,6 +10,7 @@ from sensed_arms import frictionless, motion
 
 from tauhat.errors import SensingError
 from tauhat.recordings import Recording
+from tauhat.report.contact_words import zero_words
 from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
 from tauhat.sensing.hidden import hidden_along
 from tauhat.sensing.judged_log import judged_log
@@ -51,6 +52,15 @@ def test_nothing_is_told_where_the_pass_had_ended():
     assert left.settled[(left.t > 0.5) & (left.t < 8.0)].all()
     assert not left.settled[left.t > 8.2].any()
     assert np.abs(left.tau[(left.t > 1.5) & (left.t < 7.9)]).max() < 1e-6
+
+
+def test_a_log_from_long_before_the_pass_is_refused():
+    known = air_pass(SENSOR.along(log(0.0, 12.0)))
+    late = AirPass(
+        progress=known.progress + 30.0, torque=known.torque, wrench=known.wrench, q=known.q
+    )  # fmt: skip
+    with pytest.raises(SensingError, match="none within it"):
+        without_air(SENSOR.along(log(0.0, 5.0)), late, solver=SOLVER)
 
 
 def test_another_motion_and_a_pass_without_positions_are_refused():
@@ -102,6 +112,8 @@ def test_what_stands_is_told_less_its_zero():
     )  # fmt: skip
     plain, less = (judged_log(SENSOR, still, LIMITS, zero=zero) for zero in ("as sensed", "standing"))
     assert np.abs(plain.sensed.tau[-1]).max() > 1.0
+    assert zero_words(plain) == ""
+    assert zero_words(less) == "Torque and force are less what was sensed as the arm came to rest."
     assert less.sensed.tau == pytest.approx(plain.sensed.tau - plain.contacts.zero)
     again = zeroed(plain.sensed, plain.contacts.zero, solver=SOLVER)
     assert (less.sensed.wrench == again.wrench).all()

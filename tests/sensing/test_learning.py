@@ -18,6 +18,7 @@ from tauhat.sensing.contact_thresholds import ContactThresholds, learn_contact_t
 from tauhat.sensing.free_logs import sensed_free, settled_seconds
 from tauhat.sensing.free_motion import learnt_from_free_motion
 from tauhat.sensing.learnt_error import LearntError, error_of
+from tauhat.sensing.observers import observer_named
 from tauhat.sensing.sensor import ForceSensor
 from tauhat.sensing.wrench import WrenchSolver
 
@@ -123,6 +124,27 @@ def test_the_floor_of_the_limits_does_not_rise_with_an_error_learnt_in_motion():
 def test_errors_that_do_not_fit_are_refused(make, message):
     with pytest.raises(SensingError, match=message):
         make()
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"observer": observer_named("kalman")},
+        {"observer": observer_named("momentum", gain=40.0)},
+        {"cutoff": 5.0},
+    ],
+)
+def test_an_error_is_only_that_of_the_observer_and_filter_it_was_learnt_with(changed, tmp_path):
+    quietly(SENSOR, [free(125.0)]).save(tmp_path / "limits.json")
+    found = load_contact_thresholds(tmp_path / "limits.json")
+    assert found.sensor_of(replace(SENSOR, rate=100.0)).rate == 100.0  # gain and filter are in seconds
+    with pytest.raises(SensingError, match="--observer momentum --gain 20 --cutoff 10"):
+        found.sensor_of(replace(SENSOR, **changed))
+    data = json.loads((tmp_path / "limits.json").read_text(encoding="utf-8"))
+    del data["error"]["settings"]
+    (tmp_path / "limits.json").write_text(json.dumps(data), encoding="utf-8")
+    unknown = load_contact_thresholds(tmp_path / "limits.json").sensor_of(replace(SENSOR, **changed))
+    assert (unknown.model.rms == SENSOR.model.rms).all()
 
 
 def test_a_solver_is_kept_when_an_error_is_put_on_its_sensor():

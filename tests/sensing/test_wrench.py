@@ -7,7 +7,7 @@ import pinocchio
 import pytest
 
 from sample_arms import random_tree
-from tauhat.errors import RobotError, SensingError
+from tauhat.errors import ArrayError, RobotError, SensingError
 from tauhat.robots import Robot, forward_kinematics, load_robot
 from tauhat.robots.kinematics import pinocchio_model
 from tauhat.sensing.wrench import DIRECTIONS, WrenchSolver, directions_named
@@ -107,6 +107,29 @@ def test_errors_that_belong_together_are_weighted_by_their_whole_covariance():
 def test_a_correlation_that_is_none_is_refused(correlation):
     with pytest.raises(SensingError, match="correlation of the joints' errors"):
         WrenchSolver(robot=UR5E, correlation=correlation)
+
+
+def test_a_direction_with_a_known_size_is_solved_with_that_prior():
+    rng = np.random.default_rng(8)
+    tau, variance = rng.normal(size=6), rng.uniform(0.5, 2.0, 6)
+    sizes = np.array([4.0, 0.5, 200.0])
+    solver = WrenchSolver(robot=UR5E, directions=DIRECTIONS["force"], sizes=sizes)
+    jacobian, _ = solver.jacobian(HOME)
+    columns = jacobian[:3].T
+    information = columns.T @ (columns / variance[:, None]) + np.diag(sizes**-2.0)
+    expected = np.linalg.solve(information, columns.T @ (tau / variance))
+    found = solver.at(HOME, tau, variance)
+    assert found.wrench[:3] == pytest.approx(expected, rel=1e-6)
+    assert found.covariance[:3, :3] == pytest.approx(np.linalg.inv(information), rel=1e-6)
+    usual = WrenchSolver(robot=UR5E, directions=DIRECTIONS["force"])
+    same = WrenchSolver(robot=UR5E, directions=DIRECTIONS["force"], sizes=np.full(3, usual.largest[0]))
+    assert same.at(HOME, tau, variance).wrench == pytest.approx(usual.at(HOME, tau, variance).wrench, abs=1e-12)
+
+
+@pytest.mark.parametrize("sizes", [[1.0, 2.0], [1.0, 0.0, 1.0], [1.0, np.nan, 1.0]])
+def test_sizes_that_mean_nothing_are_refused(sizes):
+    with pytest.raises((SensingError, ArrayError)):
+        WrenchSolver(robot=UR5E, directions=DIRECTIONS["force"], sizes=np.array(sizes))
 
 
 def test_near_a_singularity_the_answer_stays_small_and_says_what_it_does_not_know():
