@@ -219,6 +219,7 @@ def wrist_table(arm: Arm, models: Ur5Models, quick: bool) -> list[dict[str, Any]
         fits |= {kind: arm.fitted(everything, kind) for kind in ("auto", "plain")}
         fits["robust, without No3"] = models.without("Movement_No3_Acc")
     cases: list[tuple[str, dict[str, Any]]] = [(kind, {}) for kind in fits]
+    cases += [("robust", {"observer": observer_named("refresh")})]
     cases += [(physical, {"observer": observer_named(name)}) for name in OBSERVERS]
     cases += [(physical, {"observer": observer_named("momentum", gain=gain)}) for gain in (10.0, 40.0)]
     cases += [(physical, {"cutoff": cutoff}) for cutoff in (5.0, 20.0)]
@@ -249,6 +250,19 @@ def zeroed_rows(models: Ur5Models, log: Recording, wrist: Wrist) -> list[dict[st
             word = f"momentum, gain {gain:g}, zeroed, follows in {follow:g} s"
             row = against_wrist(zeroed(found, zero, solver=solver), wrist)
             rows.append({"model": "robust", "settings": word} | row | response(estimate, log, observer=observer))
+    return rows
+
+
+def refresh_rows(models: Ur5Models) -> list[dict[str, Any]]:
+    """Rms of the force of free runs, each by a model that has not seen it, with friction followed and without."""
+    rows = []
+    for name in SLOW_FREE:
+        each = [
+            sensed(models.without(name), models.arm.log(name), observer=observer_named(observer))
+            for observer in ("momentum", "refresh")
+        ]
+        plain, followed = (float(np.sqrt(np.mean(np.sum(log.wrench[log.settled, :3] ** 2, axis=1)))) for log in each)
+        rows.append({"log": name, "momentum": plain, "refresh": followed})
     return rows
 
 
@@ -528,7 +542,13 @@ def show_payload(rows: list[dict[str, Any]]) -> None:
         )
 
 
-SHOWN = {"wrist": show_wrist, "clock": show_clock, "payload": show_payload}
+def show_refresh(rows: list[dict[str, Any]]) -> None:
+    print("\nrms of the force in free motion, N: momentum, refresh")
+    for row in rows:
+        print(f"{row['log'][:42]:42} {row['momentum']:6.2f} {row['refresh']:6.2f}")
+
+
+SHOWN = {"wrist": show_wrist, "refresh": show_refresh, "clock": show_clock, "payload": show_payload}
 
 
 def arms(data: Path) -> dict[str, Arm]:
@@ -551,6 +571,7 @@ def main() -> None:
     models = Ur5Models(both["ur5"])
     ways: dict[str, Callable[[], Any]] = {
         "wrist": lambda: wrist_table(both["ur5"], models, options.quick),
+        "refresh": lambda: refresh_rows(models),
         "ur5": lambda: ur5_contacts(both["ur5"], models),
         "ur10e": lambda: ur10e_contacts(both["ur10e"]),
         "clock": lambda: clock_rows(both["ur10e"]),

@@ -119,9 +119,17 @@ def test_a_carried_body_is_called_one_in_table_document_and_page(bench: Bench, t
     name = f"carries {longest['payload']['mass']:.2f} kg"
     assert name in said
     text = page.read_text(encoding="utf-8")
-    for word in (name, "carrying: contacts", "in parts of its threshold", "Hidden [%]", "do not tell every direction"):
+    for word in (
+        name,
+        "less what the same motion shows in air",
+        "carrying: contacts",
+        "in parts of its threshold",
+        "Hidden [%]",
+        "do not tell every direction",
+    ):
         assert word in text
     assert "hidden %" in said
+    assert "behind starts or off the pass in air" in " ".join(said.split())
 
 
 def test_the_warmth_of_the_joints_is_on_the_page_of_the_observer_that_follows_it(bench: Bench, tmp_path: Path) -> None:
@@ -166,17 +174,26 @@ def test_a_stream_takes_off_the_same_zero_as_a_log(bench: Bench, tmp_path: Path)
         (("--zero", "air:nowhere.parquet"), "nowhere.parquet"),
         (("--zero", "none", "--thresholds", "{limits}"), "learnt with another zero"),
         (("--thresholds", "{behind}"), "behind a pass in air"),
+        (("--zero", "standing", "--thresholds", "{without}"), "expected none, got standing"),
+        (("--zero", "standing:2", "--thresholds", "{limits}"), "leave the numbers out"),
+        (("--gain", "40", "--thresholds", "{limits}"), "learnt with another sensor"),
+        (("--free", "{air}", "--thresholds", "{estimate}"), "would overwrite a file it is made from"),
+        (("--free", "{air}", "-o", "{air}"), "would overwrite a file it is made from"),
+        (("--zero", "air:{air}", "-o", "{air}"), "would overwrite a file it is made from"),
     ],
 )
 def test_zeros_that_do_not_fit_are_refused_in_one_line(
     bench: Bench, workshop: Workshop, tauhat: Tauhat, tmp_path: Path, words: tuple[str, ...], message: str
 ) -> None:
-    limits, behind = tmp_path / "limits.json", tmp_path / "behind.json"
-    if "--thresholds" in words:
+    limits, behind, without = (tmp_path / f"{name}.json" for name in ("limits", "behind", "without"))
+    if "--thresholds" in words and "{estimate}" not in words:
         document(bench.estimate, bench.free, "--free", bench.air, "--thresholds", limits)
         learnt = json.loads(limits.read_text(encoding="utf-8"))
         behind.write_text(json.dumps(learnt | {"taken_off": "air"}), encoding="utf-8")
-    places = {"air": bench.air, "other": workshop.log, "limits": limits, "behind": behind}
+        rules = learnt["rules"] | {"zero": learnt["rules"]["zero"] | {"seconds": 0.0}}
+        without.write_text(json.dumps(learnt | {"rules": rules}), encoding="utf-8")
+    places = {"air": bench.air, "other": workshop.log, "limits": limits, "behind": behind, "without": without}
+    places["estimate"] = bench.estimate
     result = tauhat("sense", bench.estimate, bench.free, *(word.format(**places) for word in words))
     assert result.exit_code == 1
     assert message in result.stderr
@@ -188,6 +205,22 @@ def test_words_that_name_no_zero_are_errors(bench: Bench, tauhat: Tauhat, zero: 
     result = tauhat("sense", bench.estimate, bench.free, "--zero", zero)
     assert result.exit_code in (1, 2)
     assert "zero" in result.stderr
+
+
+def test_a_stream_refuses_thresholds_behind_a_pass_and_a_rate_of_alarms_that_nobody_reads(
+    bench: Bench, tauhat: Tauhat, tmp_path: Path
+) -> None:
+    limits = tmp_path / "limits.json"
+    document(bench.estimate, bench.free, "--free", bench.air, "--thresholds", limits)
+    stream = ("sense", bench.estimate, "--input", "-", "--rate", 250, "--thresholds", limits)
+    result = tauhat(*stream, "--alarms", 5)
+    assert result.exit_code == 2
+    assert "needs --free" in " ".join(result.stderr.split())
+    learnt = json.loads(limits.read_text(encoding="utf-8"))
+    limits.write_text(json.dumps(learnt | {"taken_off": "air"}), encoding="utf-8")
+    result = tauhat(*stream)
+    assert result.exit_code == 1
+    assert "behind a pass in air" in result.stderr
 
 
 def test_a_stream_has_no_pass_in_air(bench: Bench, tauhat: Tauhat) -> None:

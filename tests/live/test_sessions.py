@@ -17,11 +17,13 @@ from live_server import LOG, MESSAGES, RATE, SENSOR, SERVICE, THRESHOLDS
 
 from tauhat.errors import LiveError, SensingError
 from tauhat.live import Feed, Limits, Service, Session, Snapshot
+from tauhat.live.followers import Followers
 from tauhat.live.outbox import Outbox
 from tauhat.live.protocol import AnswerForm
 from tauhat.live.throttle import Throttle
 from tauhat.live.waiting_room import WaitingRoom
 from tauhat.recordings import Recording
+from tauhat.report.live_panel import counts_html
 from tauhat.robots.kinematics import pinocchio_model
 from tauhat.sensing import ContactDetector, WrenchSolver, zeroed
 
@@ -111,6 +113,31 @@ def test_skips_are_told_at_once_and_then_once_a_second():
         session.receive(b"nonsense", 0.01 * k)
     notices = emptied(outbox)
     assert [notice["counts"]["malformed"] for notice in notices] == [1, 101, 201]
+
+
+def test_a_controller_that_hangs_is_told_once_a_second_and_shown_on_the_page():
+    outbox, panel = Outbox(9999), Panel()
+    session = Session(Service(sensor=SENSOR, feed=Feed(panel)), name="one", outbox=outbox)
+    hung = {"q": LOG.q[99].tolist(), "tau": LOG.tau[99].tolist()}
+    for row in range(2100):
+        text = MESSAGES[row] if row < 100 else json.dumps({"t": row / RATE} | hung)
+        session.receive(text.encode(), row / 1024.0)  # a clock whose seconds are exact
+    told = emptied(outbox)
+    notices = [message for message in told if "notice" in message]
+    assert [notice["notice"] for notice in notices] == ["frozen", "frozen"]
+    assert [notice["counts"]["frozen"] for notice in notices] == [10, 1034]
+    assert len(told) == 2100 + 2
+    assert session.counts["frozen"] == 2000
+    assert panel.shown[0].counts["frozen"] == 0
+    assert panel.shown[-1].counts["frozen"] > 1900
+    assert "12 frozen" in counts_html({"frozen": 12})
+
+
+def test_a_session_without_a_robot_to_follow_says_so():
+    outbox = Outbox(9)
+    session = Session(SERVICE, name="one", outbox=outbox, followers=Followers())
+    session.receive(b'{"command": "follow"}', 0.0)
+    assert emptied(outbox) == [{"notice": "follow", "robot": None, "state": None}]
 
 
 numbers = some.floats(allow_nan=False, allow_infinity=False, width=32)

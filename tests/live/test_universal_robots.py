@@ -15,6 +15,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from played_arm import CONSTANTS, CURRENTS, PLAYED, RATE, ROBOT, START, robot_at, rows, sensor
 from rtde_stand_in import PORT, RtdeStandIn
 from typer.testing import CliRunner
 
@@ -23,61 +24,21 @@ from tauhat.dynamics import torque_model
 from tauhat.errors import LiveError, MapError, MissingExtraError, OutputError, SensingError
 from tauhat.estimation import identify
 from tauhat.live.clients import Clients
-from tauhat.live.current_map import CurrentMap, map_of_constants
+from tauhat.live.current_map import CurrentMap
 from tauhat.live.robot_channel import stream_robot
 from tauhat.live.robot_log import record
 from tauhat.live.rtde_greeting import greet
 from tauhat.live.service import Service
 from tauhat.live.universal_robots import LiveSample, RobotLink, UniversalRobot, sensed
 from tauhat.recordings import Log, Recording, parse_map, read_recording
-from tauhat.robots import load_robot
-from tauhat.robots.kinematics import pinocchio_model
-from tauhat.sensing import ForceSensor, SensedModel
-from tauhat.sensing.thermal import SensedHeat
 from tauhat.verification import verify
 
 pytest.importorskip("rtde_receive", reason="ur_rtde cannot be installed here: no wheel for this platform")
-
-RATE = 500.0
-CONSTANTS = (14.87, 13.26, 11.13, 10.62, 11.03, 11.47)
-CURRENTS = map_of_constants(CONSTANTS)
-ROBOT = load_robot("ur5e")
-START = 4321.5  # the controller has been running for a while
-
-
-def played(seconds: float = 20.0, rate: float = RATE) -> dict[str, np.ndarray]:
-    """Return what a controller tells while an arm without friction moves, its torque by Pinocchio."""
-    import pinocchio
-
-    t, phase = np.arange(int(seconds * rate)) / rate, np.arange(6)
-    speed = 1.3 + 0.4 * phase
-    swing = speed * t[:, None] + phase
-    q, dq, ddq = 0.8 * np.sin(swing), 0.8 * speed * np.cos(swing), -0.8 * speed**2 * np.sin(swing)
-    model = pinocchio_model(ROBOT)
-    data = model.createData()
-    tau = np.array([pinocchio.rnea(model, data, *state) for state in zip(q, dq, ddq, strict=True)])
-    warm = 30.0 + 0.01 * t[:, None] + phase
-    return {
-        "timestamp": START + t, "actual_q": q, "actual_current": tau / CONSTANTS, "target_moment": tau,
-        "target_current": tau / 10.0, "joint_temperatures": warm,
-    }  # fmt: skip
-
-
-PLAYED = played()
-
-
-def robot_at(stand_in: RtdeStandIn, **settings: object) -> UniversalRobot:
-    chosen: dict[str, object] = {"currents": CURRENTS, "rate": RATE, "patience": 5.0, "silence": 0.6} | settings
-    return UniversalRobot(address=stand_in.address, **chosen)  # type: ignore[arg-type]
 
 
 def samples(stand_in: RtdeStandIn, count: int, **settings: object) -> tuple[list[LiveSample], object]:
     with robot_at(stand_in, **settings).connect() as link:
         return list(islice((sample for sample in link if sample is not None), count)), link
-
-
-def rows(t: np.ndarray) -> np.ndarray:
-    return np.searchsorted(PLAYED["timestamp"], t)
 
 
 def test_position_and_current_are_of_one_cycle_and_bit_equal_to_what_the_controller_sent():
@@ -138,18 +99,6 @@ def test_a_map_without_torque_constants_for_currents_is_refused_by_name(torque, 
     text = f'[time]\ncolumn = "t"\n[position]\ncolumns = "q_{{1..6}}"\n{torque}\n'
     with pytest.raises(MapError, match=message):
         CurrentMap(log_map=parse_map(text))
-
-
-def sensor(rate: float) -> ForceSensor:
-    from tauhat.dynamics.passive_kernel import ELEMENT
-    from tauhat.dynamics.terms import Thermal
-
-    nothing = np.zeros(0, dtype=ELEMENT)
-    model = SensedModel(
-        robot=ROBOT, inertia=ROBOT.inertia, rotor=np.zeros(6), sliding=nothing, bristles=nothing,
-        rms=np.full(6, 0.1), slow=np.full(6, 0.02), heat=SensedHeat(term=Thermal(), slopes=np.zeros((6, 2))),
-    )  # fmt: skip
-    return ForceSensor(model=model, rate=rate)
 
 
 def test_what_is_sensed_live_is_what_is_sensed_along_a_log_of_the_same_samples():

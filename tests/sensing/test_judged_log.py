@@ -134,6 +134,10 @@ def test_directions_are_hidden_as_long_as_the_solver_says():
     seven = WrenchSolver(robot=MODEL.robot, directions=DIRECTIONS["force"])
     told = hidden_along(SENSOR.along(log(0.0, 5.0)), seven)
     assert (told.share, told.mostly) == (0.0, ())
+    sensed = SENSOR.along(log(0.0, 5.0))
+    assert (
+        hidden_along(replace(sensed, lag=np.full_like(sensed.lag, 1e4)), seven).share == 1.0
+    )  # the lag's doubt counts
 
 
 def test_warmth_along_a_log_is_that_behind_each_sample():

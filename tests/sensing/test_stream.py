@@ -50,10 +50,43 @@ def spoiled() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_samples_that_are_none_are_counted_and_change_nothing():
     t, q, tau = spoiled()
     found = SENSOR.along(log(t, q, tau))
-    assert found.counts == (len(T), 4, 4, 4, 0, 0)
+    assert found.counts == (len(T), 4, 4, 4, 0, 0, 0)
     assert found.counts.skipped == 12
     assert (found.tau == WHOLE.tau).all()
     assert (t[found.rows] == T).all()
+
+
+def hung(rows: dict[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the samples, but for rows at which the controller goes on repeating what it said, so many times."""
+    q, tau = Q.copy(), TAU.copy()
+    for row, times in rows.items():
+        q[row + 1 : row + 1 + times], tau[row + 1 : row + 1 + times] = q[row], tau[row]
+    return T, q, tau
+
+
+@pytest.mark.parametrize(("rows", "frozen"), [({50: 9}, 0), ({50: 10}, 10), ({50: 25, 100: 9, 120: 12}, 37)])
+def test_samples_of_a_controller_that_hangs_are_taken_and_counted_from_ten_in_a_row_on(rows, frozen):
+    t, q, tau = hung(rows)
+    memory, found = streamed(t[:200], q[:200], tau[:200])
+    along = SENSOR.along(log(t[:200], q[:200], tau[:200]))
+    assert memory.counts == along.counts == (200, 0, 0, 0, 0, 0, frozen)
+    assert len(found) == 200
+    assert along.to_dict()["frozen"] == frozen
+    assert np.ptp(np.array(found)[50:60], axis=0).max() > 1e-3  # what is filtered of them goes on changing
+
+
+def test_a_position_or_a_torque_that_repeats_alone_is_not_frozen():
+    t, q, tau = hung({50: 100})
+    sixth = tau.copy()
+    sixth[:, 5] = np.nextafter(tau[:, 5], np.where(np.arange(len(T)) % 2, 1e3, -1e3))  # the last bit of one joint
+    for one, other in ((q, TAU), (Q, tau), (q, sixth)):
+        assert streamed(t[:200], one[:200], other[:200])[0].counts.frozen == 0
+        assert SENSOR.along(log(t, one, other)).counts.frozen == 0
+
+
+def test_a_sample_that_is_told_twice_is_repeated_and_not_frozen():
+    t, q, tau = (np.repeat(values[:20], 20, axis=0) for values in (T, Q, TAU))
+    assert streamed(t, q, tau)[0].counts == (20, 0, 380, 0, 0, 0, 0)
 
 
 def test_a_stream_gives_what_the_log_gives():
@@ -86,7 +119,7 @@ def test_stamps_that_jitter_come_in_bunches_or_are_coarse_change_nothing():
     for t in (jitter, bunched):
         assert (np.diff(t) > 0.0).all()
         found = SENSOR.along(log(t))
-        assert found.counts == (len(T), 0, 0, 0, 0, 0)
+        assert found.counts == (len(T), 0, 0, 0, 0, 0, 0)
         assert (found.tau == WHOLE.tau).all()
     coarse = np.round(np.arange(len(Q)) / 300.0, 3)
     assert usual_step(coarse) == pytest.approx(1.0 / 300.0, rel=2e-3)
@@ -136,8 +169,8 @@ def test_another_rate_is_refused(factor):
 
 
 def test_a_rate_that_is_a_little_off_is_taken():
-    assert streamed(1.04 * T[:250], Q[:250], TAU[:250])[0].counts == (250, 0, 0, 0, 0, 0)
-    assert streamed(0.96 * T[:250], Q[:250], TAU[:250])[0].counts == (250, 0, 0, 0, 0, 0)
+    assert streamed(1.04 * T[:250], Q[:250], TAU[:250])[0].counts == (250, 0, 0, 0, 0, 0, 0)
+    assert streamed(0.96 * T[:250], Q[:250], TAU[:250])[0].counts == (250, 0, 0, 0, 0, 0, 0)
 
 
 def test_a_log_without_one_usable_sample_is_refused():

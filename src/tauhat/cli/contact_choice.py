@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
+import typer
+
 from tauhat.cli.zero_choice import ZeroChoice
 from tauhat.errors import SensingError, TauhatWarning
 
@@ -15,7 +17,9 @@ if TYPE_CHECKING:
     from tauhat.recordings.log import Log
     from tauhat.sensing.contact_thresholds import ContactThresholds
     from tauhat.sensing.sensor import ForceSensor
-    from tauhat.sensing.zero import AirPass
+    from tauhat.sensing.zero import AirPass, StandingZero
+
+_ALARMS = 1.0  # false contacts an hour
 
 Source: TypeAlias = Literal["fit", "free motion", "thresholds"]
 """Where the standard errors of a sensor come from."""
@@ -42,16 +46,18 @@ class ContactChoice:
 
     free : logs without contact, to learn thresholds and the sensor's error from
     thresholds : file to read both from; with free logs, to write them to
-    alarms : false ones an hour that are allowed
+    alarms : false ones an hour that are allowed, to learn with; None: one
     map_file : of the free logs and of the pass in air
     zero : what is taken off
+    inputs : other files that are read, and must not be written over
     """
 
     free: tuple[Path, ...] = ()
     thresholds: Path | None = None
-    alarms: float = 1.0
+    alarms: float | None = None
     map_file: Path | None = None
     zero: ZeroChoice = field(default_factory=ZeroChoice)
+    inputs: tuple[Path, ...] = ()
 
     def prepared(self, sensor: ForceSensor) -> Prepared:
         """Return sensor and thresholds: learnt and written, read, or as the fit and experience have them.
@@ -59,24 +65,33 @@ class ContactChoice:
         Raises
         ------
         TauhatError
-            files that cannot be read or written, logs of another robot, a zero that the thresholds do not know.
+            files that cannot be read or written, logs of another robot, a zero that the thresholds do not know, a
+            sensor that they were not learnt with.
         """
         from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
+        from tauhat.sensing.judged_log import check_taken_off
+
+        if self.alarms is not None and not self.free:
+            raise typer.BadParameter("needs --free LOG, to learn thresholds from", param_hint="'--alarms'")
 
         air = self.zero.air_pass(sensor, self.map_file)
         if self.free:
             return self._learnt(sensor, air)
         if self.thresholds is not None:
             found = self._read(self.thresholds)
+            check_taken_off(found, air)
             source: Source = "thresholds" if found.error is not None and found.error.is_learnt else "fit"
             return Prepared(found.sensor_of(sensor), found, air, source)
         return Prepared(sensor, assumed_contact_thresholds(sensor, rules=self.zero.rules), air, "fit")
 
     def _learnt(self, sensor: ForceSensor, air: AirPass | None) -> Prepared:
+        from tauhat.files import check_output
         from tauhat.recordings.reading import read_log
         from tauhat.sensing.contact_thresholds import learn_contact_thresholds
         from tauhat.sensing.learnt_error import error_of
 
+        if self.thresholds is not None:
+            check_output(self.thresholds, inputs=(*self.inputs, *self.free))
         if self.zero.log is not None and self.zero.log.resolve() in {log.resolve() for log in self.free}:
             raise SensingError(
                 "the pass in air is no free motion to learn from", where=self.zero.log,
@@ -85,7 +100,7 @@ class ContactChoice:
         logs = [read_log(log, map=self.map_file) for log in self.free]
         taught, source = _taught(sensor, logs, air)
         learnt = learn_contact_thresholds(
-            sensor, logs, rate=self.alarms, rules=self.zero.rules, air=air, error=error_of(taught)
+            sensor, logs, rate=self.alarms or _ALARMS, rules=self.zero.rules, air=air, error=error_of(taught)
         )
         if self.thresholds is not None:
             learnt.save(self.thresholds)
@@ -95,14 +110,20 @@ class ContactChoice:
         from tauhat.sensing.contact_thresholds import load_contact_thresholds
 
         found, asked = load_contact_thresholds(path), self.zero.rules
-        if asked is not None and asked.zero != found.rules.zero:
+        learnt = found.rules.zero
+        wanted = learnt if asked is None else asked.zero
+        if wanted != learnt or (self.zero.kind == "standing" and not learnt.seconds):
+            kept = "the numbers" if self.zero.numbers and learnt.seconds else "--zero"
             raise SensingError(
-                "thresholds were learnt with another zero", where=path,
-                expected=f"seconds {found.rules.zero.seconds:g}, follow {found.rules.zero.follow:g}",
-                got=f"seconds {asked.zero.seconds:g}, follow {asked.zero.follow:g}",
-                remedy="leave the numbers out, or learn thresholds with this zero (--free)",
+                "thresholds were learnt with another zero", where=path, expected=_zero_words(learnt),
+                got=_zero_words(wanted) if wanted != learnt else "standing",
+                remedy=f"leave {kept} out, or learn thresholds with this zero (--free)",
             )  # fmt: skip
         return found
+
+
+def _zero_words(zero: StandingZero) -> str:
+    return f"standing:{zero.seconds:g}:{zero.follow:g}" if zero.seconds else "none"
 
 
 def _taught(sensor: ForceSensor, logs: Sequence[Log], air: AirPass | None) -> tuple[ForceSensor, Source]:

@@ -109,4 +109,5 @@ def _sentence(counts: SampleCounts) -> str:
         "malformed": counts.malformed,
     }  # fmt: skip
     said = ", ".join(f"{count} {name}" for name, count in skipped.items() if count) or "none"
-    return f"{counts.taken} samples; skipped: {said}; started again {counts.restarts} times"
+    frozen = f"; frozen, as of a controller that hangs: {counts.frozen}" if counts.frozen else ""
+    return f"{counts.taken} samples; skipped: {said}; started again {counts.restarts} times{frozen}"

@@ -64,6 +64,9 @@ ThresholdsOption: TypeAlias = Annotated[
     ),
 ]  # fmt: skip
 AlarmsOption: TypeAlias = Annotated[
-    float,
-    typer.Option("--alarms", metavar="RATE", parser=frequency, help="False contacts an hour allowed, with --free."),
-]
+    float | None,
+    typer.Option(
+        "--alarms", metavar="RATE", parser=frequency, show_default="1",
+        help="False contacts an hour allowed, with --free.",
+    ),
+]  # fmt: skip

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 
 from tauhat.errors import LiveError
+from tauhat.live.followers import Followers
 from tauhat.live.outbox import Outbox
 from tauhat.live.service import Service
 from tauhat.live.session import Session
@@ -14,6 +15,7 @@ from tauhat.live.throttle import Throttle
 from tauhat.live.waiting_room import WaitingRoom
 
 _LOOKED = 0.05  # [s] between looks at what the page asks for
+_UNPROVED = frozenset({"udp"})  # where anybody's address may be written on a message: nothing goes there unasked
 
 
 class Client:
@@ -26,10 +28,12 @@ class Client:
 
     __slots__ = ("hang_up", "heard", "outbox", "session", "throttle")
 
-    def __init__(self, service: Service, *, name: str, now: float, hang_up: Callable[[], object]) -> None:
+    def __init__(
+        self, service: Service, *, name: str, now: float, hang_up: Callable[[], object], followers: Followers | None
+    ) -> None:
         limits = service.limits
         self.outbox = Outbox(limits.queue, pause=limits.notice)
-        self.session = Session(service, name=name, outbox=self.outbox)
+        self.session = Session(service, name=name, outbox=self.outbox, followers=followers)
         self.throttle = Throttle(limits.messages)
         self.heard = now
         self.hang_up = hang_up
@@ -46,12 +50,14 @@ class Clients:
     ----------
     totals : clients so far, and the counts of those that have left
     waiting : connections that are no clients yet
+    followers : those that are sent what is said of the robot that the server reads
     """
 
     def __init__(self, service: Service) -> None:
         self.service = service
         self.totals: Counter[str] = Counter()
         self.waiting = WaitingRoom(service.limits.waiting)
+        self.followers = Followers()
         self._clients: set[Client] = set()
 
     def __len__(self) -> int:
@@ -82,12 +88,14 @@ class Clients:
                 remedy="come again when another has left",
             )  # fmt: skip
         self.totals["clients"] += 1
-        client = Client(self.service, name=f"{kind} {self.totals['clients']}", now=now, hang_up=hang_up)
+        name, followers = f"{kind} {self.totals['clients']}", None if kind in _UNPROVED else self.followers
+        client = Client(self.service, name=name, now=now, hang_up=hang_up, followers=followers)
         self._clients.add(client)
         return client
 
     def leave(self, client: Client) -> None:
         """Forget a client; what it streamed is gone with its session."""
+        self.followers.leave(client.outbox)
         if client in self._clients:
             self._clients.remove(client)
             self.totals.update(client.session.counts)
@@ -103,9 +111,10 @@ class Clients:
                     client.session.command(name)
 
     async def watch(self) -> None:
-        """Let go, until cancelled, of clients that have been silent for too long."""
+        """Let go, until cancelled, of clients that have been silent for too long; who follows need not say anything."""
         loop, idle = asyncio.get_running_loop(), self.service.limits.idle
         while True:
             await asyncio.sleep(min(1.0, idle / 4.0))
             for client in [one for one in self._clients if loop.time() - one.heard > idle]:
-                client.hang_up()
+                if client.outbox not in self.followers:
+                    client.hang_up()

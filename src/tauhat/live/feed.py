@@ -21,7 +21,7 @@ class Snapshot(NamedTuple):
     tau_std : (n_v,) its standard error
     wrench, covariance : (6,), (6, 6) at the sensor's frame [N, Nm]
     contact : the link that is touched, empty without contact
-    counts : taken, late, not_finite, dropped, refused, restarts
+    counts : taken, late, not_finite, dropped, refused, restarts, frozen
     """
 
     stream: str

@@ -4,6 +4,7 @@ From the client
     {"t": 0.004, "q": [0.1, -1.2], "tau": [3.1, 20.4]}    a sample: s, rad or m, Nm or N, joint side; may name "joints"
     {"command": "zero"}                                   what is sensed now is nothing; "unzero" forgets that
     {"command": "counts"}                                 how many samples were taken, and why others were not
+    {"command": "follow"}                                 the answers to the robot that the server itself reads
     {"command": "end"}                                    no more will come; over UDP, which has no other end
     {"token": "..."}                                      the first message where the server asks for a token
 
@@ -30,7 +31,7 @@ from tauhat.robots.robot import Robot
 from tauhat.sensing.sample_lines import Sample, sample_of
 
 PROTOCOL = 1
-COMMANDS = ("zero", "unzero", "counts", "end")
+COMMANDS = ("zero", "unzero", "counts", "follow", "end")
 _NO_NUMBER = re.compile(r"-?(?:nan|inf)")
 _LARGEST_REFUSAL = 300  # [characters]; on datagrams an answer shall not be much longer than what it answers
 
@@ -125,9 +126,12 @@ def notice_text(kind: str, **facts: Any) -> str:
 
     dropped : a reader is too slow; `count` answers were dropped before the next, `total` so far
     skipped : samples were not taken; `counts` of all kinds
+    frozen : samples repeat to the bit, as of a controller that hangs; `counts` of all kinds
     slowed : more messages a second than granted; they are read more slowly, datagrams skipped
     zero : what was taken off the external torque, `tau_ext`
     counts : as asked for
+    follow : the answers to `robot`, which is in `state`, are yours from now on; null where the server reads none
+    robot : the robot that is followed is in another `state`: running, or why not
     ended : the server ends
     """
     return json.dumps({"notice": kind, **facts})

@@ -1,7 +1,7 @@
 """A robot as a client of the server: its samples come in as everybody's do, and the page shows what touches it.
 
-A thread waits for the robot; what it tells goes to the server's loop as messages. Answers have no reader: they are let
-go.
+A thread waits for the robot; what it tells goes to the server's loop as messages. Answers go to the clients that
+follow.
 """
 
 from __future__ import annotations
@@ -13,11 +13,16 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from tauhat.errors import LiveError, TauhatError
+from tauhat.live.universal_robots import SCHEME
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tauhat.live.clients import Clients
+    from tauhat.live.followers import Followers
     from tauhat.live.universal_robots import LiveSample, RobotLink
 
+_GREETING, _REFUSED = '{"hello"', '{"refused"'
 _WAITING = 4000  # samples that may wait for a loop that is busy; then the oldest go
 
 
@@ -31,12 +36,13 @@ async def stream_robot(link: RobotLink, clients: Clients) -> None:
     """
     from tauhat.live.conversation import converse
 
-    channel = RobotChannel(link)
+    channel = RobotChannel(link, clients.followers)
     try:
         await converse(channel, clients, access=None)
     finally:
         channel.close()
     if channel.error is not None:
+        clients.followers.tell_state(str(channel.error))
         raise channel.error
 
 
@@ -48,9 +54,11 @@ class RobotChannel:
 
     kind = "robot"
 
-    def __init__(self, link: RobotLink) -> None:
+    def __init__(self, link: RobotLink, followers: Followers) -> None:
         self.error: TauhatError | None = None
         self._link = link
+        self._followers = followers
+        followers.robot, followers.state = f"{SCHEME}{link.robot.address}", link.state
         self._loop = asyncio.get_running_loop()
         self._waiting: deque[bytes] = deque(maxlen=_WAITING)
         self._news = asyncio.Event()
@@ -68,9 +76,11 @@ class RobotChannel:
         return self._waiting.popleft()
 
     async def send(self, text: str) -> None:
-        """Let an answer go, but keep why the server refuses the robot."""
-        if text.startswith('{"refused"'):
+        """Pass an answer on to those that follow, but keep why the server refuses the robot."""
+        if text.startswith(_REFUSED):
             self.error = self.error or LiveError("the server refuses the robot", got=json.loads(text)["refused"])
+        elif not text.startswith(_GREETING):
+            self._followers.tell(text)
 
     def abort(self) -> None:
         """Do nothing: a robot that stands still for long is not sent away."""
@@ -85,23 +95,25 @@ class RobotChannel:
         self._link.close()
 
     def _read(self) -> None:
+        state = ""
         try:
             for sample in self._link:
                 if sample is not None:
-                    self._tell(_message(sample))
+                    self._hand_over(self._take, _message(sample))
+                if state != (state := self._link.state):
+                    self._hand_over(self._followers.tell_state, state)
         except TauhatError as error:
             self.error = error
         self._ended = True
-        self._tell(None)
+        self._hand_over(self._news.set)
 
-    def _tell(self, message: bytes | None) -> None:
-        """Hand a message to the loop, as long as there is one."""
+    def _hand_over(self, call: Callable[..., object], *values: object) -> None:
+        """Let the loop do something, as long as there is one."""
         if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._take, message)
+            self._loop.call_soon_threadsafe(call, *values)
 
-    def _take(self, message: bytes | None) -> None:
-        if message is not None:
-            self._waiting.append(message)
+    def _take(self, message: bytes) -> None:
+        self._waiting.append(message)
         self._news.set()
 
 

@@ -22,6 +22,8 @@ from tauhat.live.udp_server import UdpServer
 if TYPE_CHECKING:
     from websockets.asyncio.server import Server
 
+    from tauhat.live.universal_robots import RobotLink, UniversalRobot
+
 _COLLECTED = 10.0  # [s] between collections of garbage
 
 
@@ -31,17 +33,19 @@ class Channels:
 
     websocket, udp : ports, 0 for any that is free, None for none
     pipe : path of a Unix socket, None for none
+    robot : that the server itself reads, None for none; its clients may follow it
     access : address of the ports, and who is let in
     """
 
     websocket: int | None = None
     udp: int | None = None
     pipe: Path | None = None
+    robot: UniversalRobot | None = None
     access: Access = field(default_factory=Access)
 
     def __post_init__(self) -> None:
-        if self.websocket is None and self.udp is None and self.pipe is None:
-            raise LiveError("no channel for samples", expected="a WebSocket port, a UDP port or a pipe")
+        if all(way is None for way in (self.websocket, self.udp, self.pipe, self.robot)):
+            raise LiveError("no channel for samples", expected="a WebSocket port, a UDP port, a pipe or a robot")
 
 
 class LiveServer:
@@ -62,6 +66,8 @@ class LiveServer:
         self._udp: UdpServer | None = None
         self._pipe: PipeServer | None = None
         self._chores: list[asyncio.Task[None]] = []
+        self._robot: asyncio.Task[None] | None = None
+        self._link: RobotLink | None = None
 
     async def __aenter__(self) -> Self:
         async with AsyncExitStack() as unless_started:
@@ -74,11 +80,11 @@ class LiveServer:
         await self.close()
 
     async def _start(self) -> None:
-        """Listen on all channels.
+        """Listen on all channels, and to the robot.
 
         Raises
         ------
-        LiveError
+        TauhatError
             when one of them cannot be had.
         """
         access, wanted = self._channels.access, self._channels
@@ -98,12 +104,42 @@ class LiveServer:
             self.addresses["websocket"] = f"ws://{shown}:{port}/"
         chores = (self.clients.watch(), self.clients.obey(), _collect())
         self._chores = [asyncio.create_task(chore) for chore in chores]
+        if wanted.robot is not None:
+            await self._listen_to(wanted.robot)
+
+    async def _listen_to(self, robot: UniversalRobot) -> None:
+        """Read a robot as a client of its own; it comes last, so that its samples do not wait."""
+        from tauhat.live.robot_channel import stream_robot
+
+        self._link = await asyncio.to_thread(robot.connect)
+        self._robot = asyncio.create_task(stream_robot(self._link, self.clients))
+        self._chores.append(self._robot)
+        self.addresses["source"] = f"ur://{robot.address}"
+
+    async def until(self, ended: asyncio.Event) -> None:
+        """Serve until an event.
+
+        Raises
+        ------
+        TauhatError
+            as soon as the robot that the server reads is gone for good, or its samples are refused.
+        """
+        event = asyncio.create_task(ended.wait())
+        waiting = {event} if self._robot is None else {event, self._robot}
+        try:
+            await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            event.cancel()
+        if self._robot is not None and self._robot.done():
+            self._robot.result()
 
     async def close(self) -> None:
         """Say farewell to all clients and stop listening."""
         for chore in self._chores:
             chore.cancel()
         await asyncio.gather(*self._chores, return_exceptions=True)
+        if self._link is not None:
+            self._link.close()
         if self._udp is not None:
             self._udp.close()
         if self._pipe is not None:
@@ -122,8 +158,8 @@ def serve(service: Service, channels: Channels, *, started: Callable[[dict[str, 
 
     Raises
     ------
-    LiveError
-        when an address cannot be had.
+    TauhatError
+        when an address cannot be had, or the robot that it reads is gone for good.
     """
     try:
         return asyncio.run(_serve(LiveServer(service, channels), started))
@@ -138,7 +174,7 @@ async def _serve(server: LiveServer, started: Callable[[dict[str, str]], object]
     async with server:
         with seldom_collecting():  # after all is loaded and compiled
             started(dict(server.addresses))
-            await ended.wait()
+            await server.until(ended)
     return dict(server.clients.totals)
 
 

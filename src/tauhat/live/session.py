@@ -9,6 +9,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.live.feed import Snapshot
+from tauhat.live.followers import Followers
 from tauhat.live.outbox import Outbox
 from tauhat.live.protocol import COMMANDS, AnswerForm, Command, decoded, message_of, notice_text
 from tauhat.live.service import Service
@@ -25,12 +26,14 @@ class Session:
     service : sensor, thresholds, limits and page
     name : how messages and the page call the stream
     outbox : where answers go
+    followers : of the robot that the server reads; None where this client may not be one
     """
 
-    def __init__(self, service: Service, *, name: str, outbox: Outbox) -> None:
+    def __init__(self, service: Service, *, name: str, outbox: Outbox, followers: Followers | None = None) -> None:
         self.name = name
         self._service = service
         self._outbox = outbox
+        self._followers = followers
         self._stream = SensorStream(sensor=service.sensor, name=name)
         self._memory = self._stream.start()
         self._contact = None if service.detector is None else service.detector.start()
@@ -41,7 +44,7 @@ class Session:
         self._zero: FloatArray | None = None
         self._last: Sensed | None = None
         self._malformed = self._limited = 0
-        self._told = {"skipped": -np.inf, "slowed": -np.inf}
+        self._told = {"skipped": -np.inf, "slowed": -np.inf, "frozen": -np.inf}
 
     @property
     def counts(self) -> dict[str, int]:
@@ -82,12 +85,22 @@ class Session:
         if name == "counts":
             self._outbox.put(notice_text("counts", counts=self.counts), answers=0)
             return
+        if name == "follow":
+            self._follow()
+            return
         last = self._last
         self._zero = last.tau.copy() if name == "zero" and last is not None else None
         if self._service.detector is not None:
             self._contact = self._service.detector.start()
         taken_off = np.zeros(self._service.sensor.n_v) if self._zero is None else self._zero
         self._outbox.put(notice_text("zero", tau_ext=[float(f"{value:.6g}") for value in taken_off]), answers=0)
+
+    def _follow(self) -> None:
+        followers, robot, state = self._followers, None, None
+        if followers is not None and followers.robot is not None:
+            followers.add(self._outbox)
+            robot, state = followers.robot, followers.state
+        self._outbox.put(notice_text("follow", robot=robot, state=state), answers=0)
 
     def slowed(self, now: float, *, lost: int = 0) -> None:
         """Say that messages come faster than granted, and how many were lost of it."""
@@ -105,6 +118,8 @@ class Session:
             self._tell("skipped", now)
             return
         self._last = sensed
+        if self._memory.counts.frozen > counts.frozen:
+            self._tell("frozen", now)
         tau, wrench = self._zeroed(sensed)
         more = self._judged(sensed, tau)
         self._outbox.put(self._form.text(sample.t, (tau, sensed.variance, wrench, sensed.covariance), more))
@@ -139,12 +154,12 @@ class Session:
             {
                 "taken": counts.taken, "late": counts.late + counts.repeated, "not_finite": counts.not_finite,
                 "dropped": self._outbox.dropped, "refused": self._malformed + self._limited,
-                "restarts": counts.restarts,
+                "restarts": counts.restarts, "frozen": counts.frozen,
             },
         )  # fmt: skip
 
     def _tell(self, kind: str, now: float) -> None:
-        """Say of samples that were not taken, not too often: whoever wants the last word asks for the counts."""
+        """Say of samples that were not taken or are frozen, not too often: the last word is with the counts."""
         if now - self._told[kind] < self._service.limits.notice:
             return
         self._told[kind] = now

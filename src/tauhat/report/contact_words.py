@@ -9,6 +9,7 @@ from tauhat.report.formatting import number
 if TYPE_CHECKING:
     from tauhat.sensing.contact import ContactEvent
     from tauhat.sensing.hidden import Hidden
+    from tauhat.sensing.judged_log import JudgedLog
 
 _PERCENT = 100.0
 
@@ -21,6 +22,14 @@ def kind_of(event: ContactEvent) -> str:
     if found.verdict == "no payload":
         return "contact"
     return f"{'carries' if found.verdict == 'payload' else 'push, or'} {found.mass:.2f} kg"
+
+
+def zero_words(judged: JudgedLog) -> str:
+    """Return what is taken off torque and wrench of a log; nothing where they are as sensed."""
+    off = ["what the same motion shows in air"] if judged.air else []
+    off += ["what was sensed as the arm came to rest"] if judged.zero == "standing" else []
+    more = " Where the arm is elsewhere than in that pass nothing is told." if judged.air else ""
+    return f"Torque and force are less {' and '.join(off)}.{more}" if off else ""
 
 
 def hidden_words(hidden: Hidden) -> str:

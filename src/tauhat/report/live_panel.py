@@ -19,7 +19,7 @@ _SHOWN = 6  # contacts
 _LONGEST = 40  # letters of a name
 _COUNTS = {
     "taken": "samples taken", "late": "late", "not_finite": "not finite", "dropped": "answers dropped",
-    "refused": "refused", "restarts": "restarts",
+    "refused": "refused", "restarts": "restarts", "frozen": "frozen",
 }  # fmt: skip
 STYLE = (
     "<style>.th{font:13px/1.4 system-ui,sans-serif;padding:2px 12px;font-variant-numeric:tabular-nums}"

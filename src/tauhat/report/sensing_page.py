@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.report.contact_words import hidden_words, kind_of
+from tauhat.report.contact_words import hidden_words, kind_of, zero_words
 from tauhat.report.page import require_libraries, write_page
 from tauhat.report.study_page import ShownChart, shown_table
 from tauhat.sensing.beside_sensor import beside_sensor
@@ -29,7 +29,10 @@ _CONTACTS = (
     "A contact begins where the external torque of a joint passes its threshold and ends below the release. A joint "
     "feels what acts behind it: the link is the last that felt it, and what is touched is that or one further out."
 )
-_PAYLOADS = "Events of three seconds or more say whether a body that is carried explains them. Excess: in thresholds."
+_PAYLOADS = (
+    "± is one standard error. Excess: in thresholds. Events of three seconds or more say whether a body that is "
+    "carried explains them."
+)
 _WARMTH = (
     "Zero where the recording of the fit began, one what a joint's typical speed would bring. Learnt where nothing "
     "touches the arm."
@@ -129,8 +132,8 @@ def _sections(log: SensedLog, measured: FloatArray | None, index: int, judged: J
     chart = bands_plot(log.t, forces, key=f"wrench-{index}", caption=f"At {log.frame}, axes of the {log.axes}")
     told = judged.hidden if judged is not None and judged.hidden.share else None
     tables = (_wrench_table(log, seen.tolist(), told), *_beside(log, measured))
-    hidden = () if judged is None else tuple(filter(None, (hidden_words(judged.hidden),)))
-    text = (_counted(log), _SIGN, _START, *hidden)
+    more = () if judged is None else tuple(filter(None, (zero_words(judged), hidden_words(judged.hidden))))
+    text = (_counted(log), _SIGN, _START, *more)
     yield _section(f"wrench-of-{index}", f"{log.name}: force", text, tables, ShownChart(chart, ""))
     units = ["N" if name in log.prismatic else "Nm" for name in log.joint_names]
     joints = [

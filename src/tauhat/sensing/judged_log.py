@@ -32,6 +32,7 @@ class JudgedLog:
     contacts : what touched the arm; events that are long enough say whether a carried body explains them
     thresholds : of the contacts
     hidden : directions of the wrench that the joints did not tell
+    zero, air : whether a standing zero, and whether a pass in air, is off torque and wrench
     warm_times, warmth : (n,) [s] and the warmth of the joints there; None by an observer that follows none
     """
 
@@ -39,6 +40,8 @@ class JudgedLog:
     contacts: Contacts
     thresholds: ContactThresholds
     hidden: Hidden
+    zero: Zero = "as sensed"
+    air: bool = False
     warm_times: FloatArray | None = None
     warmth: SensedWarmth | None = None
 
@@ -77,7 +80,7 @@ def judged_log(
     times, warmth = sensor.warmth_along(log) if isinstance(sensor.observer, ThermalObserver) else (None, None)
     return JudgedLog(
         sensed=sensed, contacts=contacts, thresholds=thresholds, hidden=hidden_along(sensed, sensor.solver),
-        warm_times=times, warmth=warmth,
+        zero=zero, air=air is not None, warm_times=times, warmth=warmth,
     )  # fmt: skip
 
 

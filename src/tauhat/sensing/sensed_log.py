@@ -23,6 +23,7 @@ class SampleCounts(NamedTuple):
     not_finite : a number that is none, or too large to be a robot's
     malformed : lines that are no sample
     restarts : gaps in time behind which everything began again
+    frozen : of those taken, in rows of samples that are the same to the bit, as a controller that hangs repeats them
     """
 
     taken: int = 0
@@ -31,6 +32,7 @@ class SampleCounts(NamedTuple):
     not_finite: int = 0
     malformed: int = 0
     restarts: int = 0
+    frozen: int = 0
 
     @property
     def skipped(self) -> int:
@@ -121,6 +123,7 @@ class SensedLog:
             "settled": int(np.count_nonzero(self.settled)),
             "skipped": {name: getattr(self.counts, name) for name in ("late", "repeated", "not_finite")},
             "restarts": self.counts.restarts,
+            "frozen": self.counts.frozen,
             "stamps_believed": self.believed,
             "joints": [
                 {"name": name, **size._asdict()}

@@ -17,6 +17,7 @@ from tauhat.robots.fitting import check_joint_order
 from tauhat.sensing import sensor_kernel as kernel
 from tauhat.sensing import stamp_kernel as stamp
 from tauhat.sensing.causal_filter import CausalFilter
+from tauhat.sensing.frozen import frozen_along
 from tauhat.sensing.observer_kernel import DISTURBANCE, THERMAL
 from tauhat.sensing.observers import MomentumObserver, Observer
 from tauhat.sensing.sensed_log import SampleCounts, SensedLog
@@ -247,13 +248,14 @@ class ForceSensor:
         rows = np.flatnonzero(codes <= stamp.RESTARTED)
         if not rows.size:
             raise SensingError("no sample of the log can be used", where=log.name, got=f"{log.n_t} samples")
+        frozen = 0 if log.tau is None else frozen_along(log.q[rows], log.tau[rows])
         names = ("q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled", "lag")
         joints = self.model.robot.joints
         return SensedLog(
             name=log.name, joint_names=tuple(joint.name for joint in joints),
             prismatic=tuple(joint.name for joint in joints if joint.effort_unit == "N"),
             frame=str(solver.frame), axes=solver.axes, step=self.step, t=np.array(log.t[rows]), rows=rows,
-            counts=counted(codes), believed=int(np.count_nonzero(results[-1])),
+            counts=counted(codes)._replace(frozen=frozen), believed=int(np.count_nonzero(results[-1])),
             **dict(zip(names, results[:-1], strict=True)),
         )  # fmt: skip
 

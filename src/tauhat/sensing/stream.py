@@ -5,6 +5,7 @@ What becomes of a sample:
     not after the last one                        skipped, `late` or `repeated`; 50 in a row: the clock was set back
     within five periods (or 20 ms) of the last    taken; lost samples between are put back on straight lines
     later than that                               taken, and everything starts again with wide error bars
+    the same to the bit as those before it        taken; counted as `frozen` from ten in a row on
 Stamps are believed or counted as whole periods, as positions tell (see `stamp_kernel`). The rate is judged over 100
 samples at a time: the usual step has to be the sensor's within 5 %.
 """
@@ -18,6 +19,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.sensing import stamp_kernel as stamp
+from tauhat.sensing.frozen import IN_A_ROW, newly_frozen
 from tauhat.sensing.sensed_log import SampleCounts
 from tauhat.sensing.sensor import OFF_RATE, ForceSensor, Sensed, usual_step
 
@@ -25,11 +27,20 @@ _JUDGED = 100  # samples over which the rate is measured
 
 
 class StreamMemory(NamedTuple):
-    """What a stream remembers: the sensor's memory, times since the rate was judged, and what became of samples."""
+    """What a stream remembers.
+
+    sensor : the sensor's memory
+    times : since the rate was judged [s]
+    counts : what became of samples
+    last : position and torque of the last sample taken, as bytes
+    alike : samples in a row that were like the one before them
+    """
 
     sensor: FloatArray
     times: tuple[float, ...]
     counts: SampleCounts
+    last: bytes = b""
+    alike: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,10 +75,14 @@ class SensorStream:
         """
         after, sensed, code = self.sensor.take(memory.sensor, t, q, tau)
         counts = _with(memory.counts, code)
-        times = memory.times
-        if sensed is not None:
-            times = self._judged((t,) if code == stamp.RESTARTED else (*times, t))
-        return StreamMemory(after, times, counts), sensed
+        if sensed is None:
+            return memory._replace(sensor=after, counts=counts), None
+        times = self._judged((t,) if code == stamp.RESTARTED else (*memory.times, t))
+        last = q.tobytes() + tau.tobytes()
+        alike = memory.alike + 1 if last == memory.last else 0
+        if alike >= IN_A_ROW:
+            counts = counts._replace(frozen=counts.frozen + newly_frozen(alike))
+        return StreamMemory(after, times, counts, last, alike), sensed
 
     def _judged(self, times: tuple[float, ...]) -> tuple[float, ...]:
         """Return the times that are still to be judged, after refusing those of another rate."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tauhat.cli.current_options import ConstantsOption, currents_of
 from tauhat.cli.options import JsonOption, frequency
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
@@ -17,7 +18,6 @@ from tauhat.cli.reporting import working
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tauhat.live.current_map import CurrentMap
     from tauhat.live.robot_log import RobotLog
 
 _WANTED = ("time", "interrupted")  # ends of a recording that need no warning
@@ -46,13 +46,7 @@ class Options:
             help="A map of the robot's logs, for torque constants, signs and joint names.",
         ),
     ] = None  # fmt: skip
-    constants: Annotated[
-        str | None,
-        typer.Option(
-            "--constants", metavar="K[,K...]", show_default=False,
-            help="Torque constants instead of a map: Nm at the joint per ampere, one or six.",
-        ),
-    ] = None  # fmt: skip
+    constants: ConstantsOption = None
     rate: Annotated[
         float | None,
         typer.Option(
@@ -78,33 +72,6 @@ def run(options: Options) -> None:
     if written.end not in _WANTED:
         warnings.warn(f"the recording ended early: {written.end}", TauhatWarning, stacklevel=1)
     show(_document(written, options.robot), lambda: _view(written), as_json=options.as_json)
-
-
-def currents_of(map_file: Path | None, constants: str | None) -> CurrentMap:
-    """Return what makes currents torques: a map, or torque constants with commas between.
-
-    Raises
-    ------
-    TauhatError
-        neither is there, or it does not hold torque constants.
-    """
-    from tauhat.errors import MapError
-    from tauhat.live.current_map import CurrentMap, map_of_constants
-    from tauhat.recordings.mapfile import load_map
-
-    if map_file is not None and constants is not None:
-        raise typer.BadParameter("not together with --map", param_hint="'--constants'")
-    if map_file is not None:
-        return CurrentMap(log_map=load_map(map_file))
-    if constants is None:
-        raise MapError(
-            "no torque constants: a controller tells currents, not torques",
-            remedy="give --map MAP.toml of the robot's logs, or --constants K1,...,K6 in Nm per ampere",
-        )
-    try:
-        return map_of_constants([float(number) for number in constants.split(",")])
-    except ValueError as error:
-        raise typer.BadParameter(f"not numbers with commas between: {constants}", param_hint="'--constants'") from error
 
 
 def _document(written: RobotLog, robot: str) -> dict[str, Any]:

@@ -5,13 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tauhat.cli.options import EstimateArgument, JsonOption, MapOption, RowsOption, frequency, page
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
+from tauhat.cli.sensing_options import (
+    AlarmsOption,
+    AxesOption,
+    CutoffOption,
+    DirectionsOption,
+    FrameOption,
+    FreeOption,
+    GainOption,
+    ObserverOption,
+    StampsOption,
+    ThresholdsOption,
+    ToolOption,
+)
 from tauhat.cli.zero_choice import ZeroChoice, zero_choice
 
 if TYPE_CHECKING:
@@ -41,65 +54,17 @@ class Options:
             help="External torque and wrench, sample by sample: .parquet, .csv or .csv.gz.",
         ),
     ] = None  # fmt: skip
-    observer: Annotated[str, typer.Option("--observer", metavar="NAME", help="How torque is observed.")] = "momentum"
-    gain: Annotated[
-        float | None,
-        typer.Option(
-            "--gain", metavar="K", parser=frequency, show_default="20",
-            help="Of the observer [1/s]: half of a push comes through after 0.7 / K, beside the filter.",
-        ),
-    ] = None  # fmt: skip
-    cutoff: Annotated[
-        float | None,
-        typer.Option(
-            "--cutoff", metavar="HZ", parser=frequency, show_default="10, or what the rate allows",
-            help="Of the filter that position and torque share.",
-        ),
-    ] = None  # fmt: skip
-    frame: Annotated[
-        str | None,
-        typer.Option("--frame", metavar="NAME", help="Where the wrench acts.", show_default="the robot's last"),
-    ] = None
-    directions: Annotated[
-        str,
-        typer.Option("--directions", metavar="NAME", help="What may act there: wrench, force, fx, fy or fz."),
-    ] = "wrench"
-    axes: Annotated[
-        Literal["base", "frame"], typer.Option("--axes", help="Whose axes wrench and directions are along.")
-    ] = "base"
-    tool: Annotated[
-        Path | None,
-        typer.Option(
-            "--tool", metavar="TOOL.json", show_default=False, readable=False,
-            help="What the arm carries and the estimate does not know: what `tauhat payload --json` prints.",
-        ),
-    ] = None  # fmt: skip
-    stamps: Annotated[
-        Literal["auto", "exact", "jittered"],
-        typer.Option(
-            "--stamps",
-            help="Samples were taken at their time stamps, or evenly with stamps that jitter; auto: as positions tell.",
-        ),
-    ] = "auto"
-    free: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--free", metavar="LOG", show_default=False, readable=False,
-            help="A recording without contact, of any rate, to learn from how large errors are and when something "
-            "touches the arm; may be repeated.",
-        ),
-    ] = None  # fmt: skip
-    thresholds: Annotated[
-        Path | None,
-        typer.Option(
-            "--thresholds", metavar="FILE.json", show_default=False,
-            help="What --free has taught, error bars and thresholds of contact, to read; with --free, to write.",
-        ),
-    ] = None  # fmt: skip
-    alarms: Annotated[
-        float,
-        typer.Option("--alarms", metavar="RATE", parser=frequency, help="False contacts an hour allowed, with --free."),
-    ] = 1.0
+    observer: ObserverOption = "momentum"
+    gain: GainOption = None
+    cutoff: CutoffOption = None
+    frame: FrameOption = None
+    directions: DirectionsOption = "wrench"
+    axes: AxesOption = "base"
+    tool: ToolOption = None
+    stamps: StampsOption = "auto"
+    free: FreeOption = None
+    thresholds: ThresholdsOption = None
+    alarms: AlarmsOption = None
     zero: Annotated[
         ZeroChoice | None,
         typer.Option(
@@ -178,7 +143,7 @@ def _contacts(options: Options) -> ContactChoice:
 
     return ContactChoice(
         free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms,
-        map_file=options.map_file, zero=options.zero or ZeroChoice(),
+        map_file=options.map_file, zero=options.zero or ZeroChoice(), inputs=_inputs(options),
     )  # fmt: skip
 
 
@@ -212,13 +177,21 @@ def _check_outputs(options: Options) -> None:
     from tauhat.recordings.writing import log_ending
     from tauhat.report.page import require_libraries
 
-    inputs = [options.estimate, *(options.logs or ()), *filter(None, [options.map_file, options.tool])]
+    inputs = [*_inputs(options), *(options.free or ()), *filter(None, [options.thresholds])]
     if options.output is not None:
         log_ending(options.output)
         check_output(options.output, inputs=inputs)
     if options.report is not None:
         require_libraries()
         check_output(options.report, inputs=[*inputs, *filter(None, [options.output])])
+
+
+def _inputs(options: Options) -> tuple[Path, ...]:
+    """Return the files that are read, beside those of `--free` and `--thresholds`."""
+    passed = options.zero.log if options.zero is not None else None
+    return (
+        options.estimate, *(options.logs or ()), *filter(None, [options.map_file, options.tool, passed]),
+    )  # fmt: skip
 
 
 def _logs(options: Options) -> list[Log]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tauhat.cli.current_options import ConstantsOption, currents_of
 from tauhat.cli.options import EstimateArgument, JsonOption, MapOption, frequency
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import say, working
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from tauhat.live.access import Access
     from tauhat.live.feed import Page
     from tauhat.live.server import Channels
+    from tauhat.live.universal_robots import UniversalRobot
 
 _WEBSOCKET = 8765
 
@@ -42,13 +44,24 @@ class Options:
 
     estimate: EstimateArgument
     rate: Annotated[
-        float,
-        typer.Option("--rate", metavar="HZ", parser=frequency, help="Of the samples.", show_default=False),
-    ]
+        float | None,
+        typer.Option(
+            "--rate", metavar="HZ", parser=frequency, show_default="with --robot, all its controller has",
+            help="Of the samples; needed without --robot.",
+        ),
+    ] = None  # fmt: skip
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot", metavar="ur://ADDRESS", show_default=False,
+            help="A Universal Robots controller to read; --map or --constants makes its currents torques.",
+        ),
+    ] = None  # fmt: skip
+    constants: ConstantsOption = None
     websocket: Annotated[
         int | None,
         typer.Option(
-            "--websocket", metavar="PORT", min=0, max=65535, show_default="8765, without --udp and --pipe",
+            "--websocket", metavar="PORT", min=0, max=65535, show_default="8765, without --udp, --pipe, --robot",
             help="Samples over WebSocket, one a text message; 0 for any port that is free.",
         ),
     ] = None  # fmt: skip
@@ -91,7 +104,7 @@ class Options:
     stamps: StampsOption = "auto"
     free: FreeOption = None
     thresholds: ThresholdsOption = None
-    alarms: AlarmsOption = 1.0
+    alarms: AlarmsOption = None
     map_file: MapOption = None
     as_json: JsonOption = False
 
@@ -103,16 +116,18 @@ def run(options: Options) -> None:
     from tauhat.live.server import serve
     from tauhat.live.service import Service
 
-    channels = _channels(options)
+    source = _source(options)
+    channels = _channels(options, source)
     with working("preparing"):
-        known = _prepared(options)
+        rate = _rate(options, source)
+        known = _prepared(options, rate)
         page = None if options.no_page else _page(known, channels.access, options.page)
     limits = Limits(clients=options.clients)
     service = Service(sensor=known.sensor, thresholds=known.thresholds, limits=limits, feed=Feed(page))
     robot = known.sensor.model.robot.name
 
     def started(addresses: Mapping[str, str]) -> None:
-        document = {"robot": robot, "rate": options.rate, **addresses}
+        document = {"robot": robot, "rate": rate, **addresses}
         document |= {} if page is None else {"page": page.url}
         show(document, lambda: [unbroken(_text(document))], as_json=options.as_json)
         sys.stdout.flush()
@@ -124,18 +139,42 @@ def run(options: Options) -> None:
     )
 
 
-def _channels(options: Options) -> Channels:
+def _source(options: Options) -> UniversalRobot | None:
+    """Return the robot that is to be read, None for none."""
+    from tauhat.live.universal_robots import SCHEME, UniversalRobot
+
+    if options.robot is None:
+        if options.constants is not None:
+            raise typer.BadParameter("needs --robot, whose currents they make torques", param_hint="'--constants'")
+        return None
+    if not options.robot.startswith(SCHEME):
+        raise typer.BadParameter(f"not a robot that can be read: {options.robot}", param_hint="'--robot'")
+    currents = currents_of(options.map_file, options.constants)
+    return UniversalRobot(address=options.robot, currents=currents, rate=options.rate)
+
+
+def _rate(options: Options, source: UniversalRobot | None) -> float:
+    """Return the rate of the samples; a robot is asked whether it has it, before anything takes time."""
+    if source is not None:
+        fastest = source.greeted().fastest
+        return fastest if options.rate is None else options.rate
+    if options.rate is None:
+        raise typer.BadParameter("needed without --robot: the rate of the samples", param_hint="'--rate'")
+    return options.rate
+
+
+def _channels(options: Options, source: UniversalRobot | None) -> Channels:
     from tauhat.live.access import Access, read_token
     from tauhat.live.server import Channels
 
     token = None if options.token_file is None else read_token(options.token_file)
-    alone = options.udp is None and options.pipe is None
+    alone = options.udp is None and options.pipe is None and source is None
     websocket = _WEBSOCKET if options.websocket is None and alone else options.websocket
     access = Access(host=options.host, token=token)
-    return Channels(websocket=websocket, udp=options.udp, pipe=options.pipe, access=access)
+    return Channels(websocket=websocket, udp=options.udp, pipe=options.pipe, robot=source, access=access)
 
 
-def _prepared(options: Options) -> Prepared:
+def _prepared(options: Options, rate: float) -> Prepared:
     """Return sensor and thresholds, as `tauhat sense` makes them."""
     from tauhat.cli.contact_choice import ContactChoice
     from tauhat.cli.sensor_choice import SensorChoice
@@ -146,9 +185,10 @@ def _prepared(options: Options) -> Prepared:
         stamps=options.stamps,
     )  # fmt: skip
     contacts = ContactChoice(
-        free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms, map_file=options.map_file
-    )
-    return contacts.prepared(choice.sensor(options.rate))
+        free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms,
+        map_file=options.map_file, inputs=tuple(filter(None, [options.estimate, options.map_file, options.tool])),
+    )  # fmt: skip
+    return contacts.prepared(choice.sensor(rate))
 
 
 def _page(known: Prepared, access: Access, port: int) -> Page:
@@ -159,6 +199,6 @@ def _page(known: Prepared, access: Access, port: int) -> Page:
 
 
 def _text(document: Mapping[str, Any]) -> str:
-    names = {"websocket": "WebSocket", "udp": "UDP", "pipe": "pipe", "page": "page"}
+    names = {"source": "robot", "websocket": "WebSocket", "udp": "UDP", "pipe": "pipe", "page": "page"}
     lines = [f"  {name:10}{document[key]}" for key, name in names.items() if key in document]
     return "\n".join([f"{document['robot']}, samples of {document['rate']:g} Hz at", *lines, "Ctrl-C ends it."])

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 
     from tauhat.cli.contact_choice import Source
     from tauhat.sensing.judged_log import JudgedLog
-    from tauhat.sensing.sensed_log import SensedLog
 
 _ERRORS = {
     "fit": "of the model's fit; --free LOG learns that of the work.",
@@ -26,7 +25,7 @@ def sensing_view(judged: JudgedLog) -> Iterator[RenderableType]:
     """Yield external torque and wrench with their typical error bars, and what became of the samples."""
     from rich.text import Text
 
-    from tauhat.report.contact_words import hidden_words
+    from tauhat.report.contact_words import hidden_words, zero_words
 
     log = judged.sensed
     data = log.to_dict()
@@ -37,9 +36,9 @@ def sensing_view(judged: JudgedLog) -> Iterator[RenderableType]:
     hidden = [f"{100.0 * part:.1f}" for part, seen in zip(judged.hidden.parts, log.solved, strict=True) if seen]
     more = {"hidden %": hidden} if judged.hidden.share else {}
     yield _sizes(where, [part for part, _ in asked], [unit for _, unit in asked], "component", more)
-    if judged.hidden.share:
-        yield Text(hidden_words(judged.hidden) + "\n")
-    yield _sentence(log)
+    for words in filter(None, (zero_words(judged), hidden_words(judged.hidden))):
+        yield Text(words + "\n")
+    yield _sentence(judged)
 
 
 def error_view(source: Source) -> RenderableType:
@@ -63,13 +62,16 @@ def _sizes(
     return made
 
 
-def _sentence(log: SensedLog) -> RenderableType:
+def _sentence(judged: JudgedLog) -> RenderableType:
     from rich.text import Text
 
-    counts = log.counts
+    log = judged.sensed
+    counts, untold = log.counts, "behind starts or off the pass in air" if judged.air else "behind starts"
     skipped = {"late": counts.late, "repeated": counts.repeated, "not finite": counts.not_finite}
     said = ", ".join(f"{count} {name}" for name, count in skipped.items() if count) or "none"
+    frozen = f" Frozen, as of a controller that hangs: {counts.frozen}." if counts.frozen else ""
     return Text(
-        f"{log.n_t} samples at {1.0 / log.step:.6g} Hz; skipped: {said}; started again {counts.restarts} times.\n"
-        f"± is one standard error. {log.n_t - int(log.settled.sum())} samples behind starts are not in the tables.\n"
+        f"{log.n_t} samples at {1.0 / log.step:.6g} Hz; skipped: {said}; started again {counts.restarts} times."
+        f"{frozen}\n"
+        f"± is one standard error. {log.n_t - int(log.settled.sum())} samples {untold} are not in the tables.\n"
     )
