@@ -14,7 +14,7 @@ from tauhat.excitation.repeated import Repeated
 from tauhat.robots import forward_kinematics, load_robot
 from tauhat.sensing import force_sensor
 from tauhat.simulation.contact import TIP, start_cell
-from tauhat.studies.polishing import PolishingStudy, chapters
+from tauhat.studies.polishing import PolishingStudy, chapters, shift
 from tauhat.studies.polishing.arm import Arm, ArmSettings, Scene
 from tauhat.studies.polishing.calibration import STEADY, CalibrationSettings
 from tauhat.studies.polishing.findings import Findings, finished, spread
@@ -150,9 +150,22 @@ def test_the_chapters_tell_the_figures_of_the_jobs():
 
 
 def test_a_break_comes_in_the_middle_of_the_shift():
-    shift = ShiftSettings()
-    assert len(shift.times) == 17
-    assert [hour for hour in shift.times if shift.rests(hour)] == [2.0, 2.25]
+    usual = ShiftSettings()
+    assert len(usual.times) == 17
+    assert [hour for hour in usual.times if usual.rests(hour)] == [2.0, 2.25]
+
+
+def test_joints_warm_up_over_a_shift_and_cool_in_the_break(arm, monkeypatch):
+    monkeypatch.setattr(shift, "SHOWN", (LOAD_CELL,))
+    hours = ShiftSettings(hours=0.75, every=900.0, rest=(0.25, 0.5))
+    done = shift.shift_of(shift.ShiftTrial(settings=SMALL, shift=hours, seed=0, motion=arm.motion))
+    assert [worked.hour for worked in done] == [0.0, 0.25, 0.5, 0.75]
+    assert all(worked.outcome.phase == "done" for worked in done)
+    cold, worked, rested, again = (job.temperature for job in done)
+    assert cold == pytest.approx(AMBIENT, abs=0.5)
+    assert worked > AMBIENT + 3.0
+    assert rested < AMBIENT + 0.3 * (worked - AMBIENT)
+    assert again > rested + 2.0
 
 
 def test_what_makes_no_sense_is_refused():

@@ -88,7 +88,10 @@ class Access:
             return True
         if header in self.origins:
             return True
-        parts = urlsplit(header) if header.isprintable() else urlsplit("")
+        try:
+            parts = urlsplit(header if header.isprintable() else "")
+        except ValueError:
+            return False  # half a bracket
         own = parts.scheme in {"http", "https"} and parts.netloc == (host or "")
         return own and self.knows_host(host)
 
@@ -107,12 +110,18 @@ def read_token(path: Path) -> str:
         when the file cannot be read, is no text, or others than its owner may read it.
     """
     try:
+        if not path.is_file():  # a pipe would be waited for
+            raise LiveError("no file with a token", where=path, got="something else" if path.exists() else "nothing there")
         if path.stat().st_mode & 0o077:
             raise LiveError("others may read the token", where=path, expected="mode 0600", remedy=f"chmod 600 {path}")
         with path.open(encoding="ascii") as file:
             return file.read(_LONGEST + 3).strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise LiveError("the token cannot be read", where=path, got=type(error).__name__) from error
+        raise LiveError("the token cannot be read", where=path, got=_reason(error)) from error
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or "no text"
 
 
 def _is_token(text: str) -> bool:

@@ -165,10 +165,14 @@ class WebSocketConnection(Connection):
     def __init__(self, address: str, *, headers: tuple[tuple[str, str], ...] = ()) -> None:
         try:
             from websockets.client import ClientProtocol
+            from websockets.exceptions import InvalidURI
             from websockets.uri import parse_uri
         except ImportError as error:
             raise MissingExtraError("websockets", "live") from error
-        uri = parse_uri(address)
+        try:
+            uri = parse_uri(address)
+        except (InvalidURI, ValueError) as error:
+            raise LiveError("not an address of a server", got=address[:100], expected="ws://host:port/") from error
         self._protocol = ClientProtocol(uri, max_size=None)
         connected = socket.create_connection((uri.host, uri.port), timeout=_OPENING)
         connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -248,8 +252,9 @@ def connect(address: str) -> Connection:
         raise LiveError("not an address of a server", got=address[:100], expected="ws://, udp:// or unix:")
     try:
         found: Connection = ways[scheme]()
-    except OSError as error:
-        raise LiveError("nobody answers", where=address, got=error.strerror or str(error)) from error
+    except (OSError, UnicodeError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        raise LiveError("nobody answers", where=address, got=reason) from error
     return found
 
 

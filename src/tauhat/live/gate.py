@@ -16,7 +16,7 @@ from collections.abc import Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, quote
 
 from tauhat.errors import LiveError, OutputError
 from tauhat.live.access import Access
@@ -78,7 +78,7 @@ class Gate:
         """Where a browser finds the page; the token is part of it where there is one."""
         host = _WILD.get(self._access.host, self._access.host)
         shown = f"[{host}]" if ":" in host else host
-        token = f"/?token={self._access.token}" if self._access.is_guarded else ""
+        token = f"/?token={quote(self._access.token, safe='')}" if self._access.token is not None else ""
         return f"http://{shown}:{self.port}{token}"
 
     def start(self) -> None:
@@ -111,12 +111,18 @@ class Gate:
             wanted = await self._wanted(reader, writer)
             if isinstance(wanted, Answer):
                 await _send(writer, wanted.encoded(), seconds=self._limits.handshake)
-            elif wanted is not None:
+            else:
                 await self._hand_on(wanted, reader, writer)
         except (OSError, TimeoutError, asyncio.IncompleteReadError):
             pass  # gone, or too slow to be told
         finally:
-            writer.close()
+            self._part(writer)
+
+    def _part(self, writer: asyncio.StreamWriter) -> None:
+        """End a connection; one that does not take what is left of its answer is not kept for it."""
+        writer.close()
+        if writer.transport.get_write_buffer_size():
+            self._loop.call_later(self._limits.stalled, writer.transport.abort)
 
     async def _wanted(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> RequestHead | Answer:
         """Return what a connection asks for, or what it is told instead."""
@@ -181,13 +187,19 @@ class Gate:
         return any(hmac.compare_digest(value.encode(), self._session.encode()) for value in values)
 
     async def _hand_on(self, head: RequestHead, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Connect the browser with the page until one of them ends it."""
+        """Connect the browser with the page until one of them ends it; it counts before anything is waited for."""
+        self._pages += head.is_upgrade
+        try:
+            await self._joined(head, reader, writer)
+        finally:
+            self._pages -= head.is_upgrade
+
+    async def _joined(self, head: RequestHead, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
             inner_reader, inner_writer = await asyncio.open_unix_connection(str(self._door))
         except OSError:
             answer = Answer(502, "The page has ended, or has not begun.\n")
             return await _send(writer, answer.encoded(), seconds=self._limits.handshake)
-        self._pages += head.is_upgrade
         try:
             inner_writer.write(head.forwarded())
             outward = _copy(inner_reader, writer, stalled=self._limits.stalled)
@@ -196,7 +208,6 @@ class Gate:
             else:
                 await outward  # what the browser says after its request is not read
         finally:
-            self._pages -= head.is_upgrade
             inner_writer.close()
 
 
@@ -239,5 +250,10 @@ def _bound(host: str, port: int) -> socket.socket:
         return socket.create_server(address[:2], family=family, backlog=64)
     except (OSError, OverflowError, UnicodeError) as error:
         raise OutputError(
-            "the page's address cannot be used", got=f"{host}, port {port}", remedy="choose another port"
-        ) from error
+            "the page's address cannot be used", where=f"{host}, port {port}", got=_reason(error),
+            remedy="choose another port or host",
+        ) from error  # fmt: skip
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)

@@ -16,6 +16,7 @@ from tauhat.live.clients import Clients
 from tauhat.live.conversation import converse
 
 _ONLY_OWNER = 0o177  # taken away from a new file's mode
+_FAREWELL = 2.0  # [s] for a client to take what is left for it
 
 
 class _Channel:
@@ -100,7 +101,14 @@ class PipeServer:
         finally:
             self._tasks.discard(task)
             self._clients.waiting.leave(channel)
-            writer.close()
+            _part(writer)
+
+
+def _part(writer: asyncio.StreamWriter) -> None:
+    """End a connection; one that does not take what is left for it is not kept for that."""
+    writer.close()
+    if writer.transport.get_write_buffer_size():
+        asyncio.get_running_loop().call_later(_FAREWELL, writer.transport.abort)
 
 
 def _bound(path: Path) -> socket.socket:

@@ -96,7 +96,7 @@ class Sender:
             else:
                 found.append(message)
         if not found and not self._connection.is_open:
-            raise LiveError("the server ended the connection", where=self.address)
+            raise LiveError("the server ended the connection" if self.hello else "nobody answers", where=self.address)
         return found
 
     def replay(self, log: Recording | Log, *, speed: float = 1.0) -> Iterator[dict[str, Any]]:
@@ -112,7 +112,7 @@ class Sender:
         Raises
         ------
         LiveError
-            a log without torque, a speed that is none, or a server that refuses.
+            a log without torque, a speed that is none, or a server that refuses or never answers.
         """
         if log.tau is None or not speed > 0.0:
             raise LiveError("nothing to replay", where=self.address, expected="a log with torque and a speed above 0")
@@ -134,7 +134,14 @@ class Sender:
                 answered, latest = max(answered, place.get(answer["t"], -1) + 1), now
                 yield answer
             if not found and now - latest > _QUIET:
+                self._check_greeted()
                 answered = sent
+
+    def _check_greeted(self) -> None:
+        if not self.hello:  # over UDP a server says nothing to whoever does not know its token
+            raise LiveError(
+                "nobody answers", where=self.address, remedy="check the address, and the token if the server asks for one"
+            )
 
     @property
     def _gap(self) -> float:

@@ -58,9 +58,12 @@ class UdpServer:
             family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, socket.SOCK_DGRAM)
             self._socket.bind(address)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:
             self.close()
-            raise LiveError("cannot listen for datagrams", where=f"{host}:{port}", got=str(error)) from error
+            reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+            raise LiveError(
+                "cannot listen for datagrams", where=f"{host}:{port}", got=reason, remedy="choose another port or host"
+            ) from error
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _KERNEL)
         self._loop.add_reader(self._socket, self._read, self._socket)

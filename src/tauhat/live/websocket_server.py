@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import socket
 from contextlib import suppress
 from functools import partial
@@ -114,18 +115,27 @@ async def serve_websocket(clients: Clients, access: Access, *, port: int) -> tup
             ping_interval=_RESTING, ping_timeout=_RESTING, max_size=limits.message, max_queue=_READ_AHEAD,
             write_limit=limits.buffer, logger=_LOG,
         )  # fmt: skip
-    except OSError as error:
-        raise LiveError("cannot listen for WebSockets", where=f"{access.host}:{port}", got=str(error)) from error
+    except (OSError, UnicodeError) as error:
+        reason = os.strerror(error.errno) if isinstance(error, OSError) and (error.errno or 0) > 0 else str(error)
+        raise LiveError(
+            "cannot listen for WebSockets", where=f"{access.host}:{port}", got=reason,
+            remedy="choose another port or host",
+        ) from error  # fmt: skip
     return server, next(iter(server.sockets)).getsockname()[1]
 
 
 async def _closed(connection: ServerConnection) -> None:
-    """Close a connection; what its client still says is read past, since its farewell comes behind that."""
+    """Close a connection; what its client still says is read past, since its farewell comes behind that.
+
+    The library waits without end for a client that reads nothing, so its connection is broken off in time.
+    """
+    breaking = asyncio.get_running_loop().call_later(2.0 * _FAREWELL, connection.transport.abort)
     closing = asyncio.ensure_future(connection.close())
     with suppress(ConnectionClosed):
         while True:
             await connection.recv(decode=False)
     await closing
+    breaking.cancel()
 
 
 def _judged(connection: ServerConnection, request: Request, *, access: Access) -> Response | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tauhat.cli.current_options import ConstantsOption, currents_of
+from tauhat.cli.broken_pipes import outliving_readers
 from tauhat.cli.options import JsonOption, frequency
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
@@ -56,6 +57,7 @@ class Options:
     as_json: JsonOption = False
 
 
+@outliving_readers()
 def run(options: Options) -> None:
     """Record a running robot: positions, currents and temperatures as its controller tells them, and their map."""
     from tauhat.errors import TauhatWarning

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tauhat.cli.current_options import ConstantsOption, currents_of
+from tauhat.cli.broken_pipes import outliving_readers
 from tauhat.cli.options import EstimateArgument, JsonOption, MapOption, frequency
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import say, working
@@ -109,6 +110,7 @@ class Options:
     as_json: JsonOption = False
 
 
+@outliving_readers()
 def run(options: Options) -> None:
     """Answer the samples of running robots with what touches them, and show it in the browser, until interrupted."""
     from tauhat.live.feed import Feed

@@ -52,7 +52,7 @@ class PolishingStudy(Study):
     difficulties: tuple[Difficulty, ...] = DIFFICULTIES
     shift: ShiftSettings = field(default_factory=ShiftSettings)
     shifts: int = 2
-    local: int = 10
+    local: int = 6
     accidents: int = 1
 
     def __post_init__(self) -> None:

@@ -81,10 +81,10 @@ def shift_of(trial: ShiftTrial) -> tuple[Worked, ...]:
         asked = replace(job, polisher=replace(job.polisher, source=source))
         running = start_cell(cell, job.beginning, rng=arm.rng_of_run(scene))
         for hour in trial.shift.times:
-            began, temperature = running.sample.t, float(running.sample.temperature.mean())
+            temperature = float(running.plant.temperature.mean())
             running.begin_work()
             log = asked.done_in(running, reader)
-            rest = trial.shift.every - (running.sample.t - began)
+            rest = trial.shift.every - float(log.t[-1] - log.t[0])
             blank = Outcome(seed=arm.seed, difficulty="easy", shape="flat", warmth="cold", sensor=name)
             done.append(Worked(float(hour), temperature, judged(blank, log, job.polisher.task.force)))
             power = running.friction_power
