@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from pathlib import Path
 
+from tauhat.errors import TauhatError
 from tauhat.live import Sender, read_token
 from tauhat.recordings import read_recording
 
@@ -41,4 +43,9 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except TauhatError as error:
+        sys.exit(f"error: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)

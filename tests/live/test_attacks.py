@@ -200,6 +200,9 @@ def test_a_token_that_is_no_secret_is_refused(tmp_path: Path):
     assert read_token(path) == TOKEN
     with pytest.raises(LiveError, match="cannot be read"):
         read_token(tmp_path / "absent")
+    os.mkfifo(tmp_path / "pipe", mode=0o600)
+    with pytest.raises(LiveError, match="expected a plain file"):
+        read_token(tmp_path / "pipe")
 
 
 def test_tokens_are_compared_in_constant_time(monkeypatch: pytest.MonkeyPatch):
@@ -260,7 +263,8 @@ def test_an_answer_to_a_datagram_is_not_much_longer_than_it(guarded: Running):
 
 
 @pytest.mark.parametrize(
-    "origin", ["https://evil.example", "null", "http://127.0.0.1.evil.example", "http://127.0.0.1", "file://"]
+    "origin",
+    ["https://evil.example", "null", "http://127.0.0.1.evil.example", "http://127.0.0.1", "file://", "http://[::1"],
 )
 def test_pages_of_other_origins_are_refused(served: Running, origin: str):
     assert handshake(served, Origin=origin)[0] == 403

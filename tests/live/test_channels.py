@@ -116,7 +116,7 @@ def test_a_disconnect_amid_a_message_leaves_the_server_as_it_was(served: Running
         connection = connect(served.addresses[channel])
         connection.send(MESSAGES[0])
         half = connection._framed(MESSAGES[1])[:100]
-        connection._socket.setblocking(True)
+        connection._socket.settimeout(5.0)
         connection._socket.sendall(half)
         connection._socket.close()
     assert served.serves(channel)
@@ -189,6 +189,22 @@ def test_a_reader_that_is_too_slow_loses_the_oldest_answers_and_is_told_how_many
     assert drops[-1]["total"] == sum(drop["count"] for drop in drops) == len(MESSAGES) - len(times) > 100
     gaps = sum(round(1000 * (later - earlier)) - 1 for earlier, later in pairwise(times))
     assert gaps == drops[-1]["total"]
+
+
+@pytest.mark.parametrize("channel", ["websocket", "pipe"])
+def test_who_ends_without_reading_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, channel: str):
+    for module in ("conversation", "pipe_server", "websocket_server"):
+        monkeypatch.setattr(f"tauhat.live.{module}._FAREWELL", 0.2)
+    limits = Limits(messages=1e6, queue=50, buffer=4096)
+    with running(tmp_path, limits=limits) as served:
+        connection = connect(served.addresses[channel])
+        connection._socket.settimeout(5.0)
+        for text in [*MESSAGES, '{"command": "end"}']:
+            connection.send(text)
+        with pytest.raises(OSError, match=r"reset|pipe"):
+            wait_until(lambda: connection._socket.send(connection._framed("{}")) == 0)
+        connection.close()
+        assert served.serves(channel)
 
 
 def wait_until(condition) -> None:
@@ -309,18 +325,32 @@ def test_a_pipe_replaces_what_a_dead_server_left_and_nothing_else(tmp_path: Path
         asyncio.run(started(Channels(pipe=tmp_path / "no" / "folder")))
 
 
-def test_a_port_that_is_taken_is_an_error_in_a_line(served: Running):
+def test_a_port_or_host_that_cannot_be_had_is_an_error_in_a_line(served: Running):
     for name in ("websocket", "udp"):
         with pytest.raises(LiveError, match="cannot listen"):
             asyncio.run(started(Channels(**{name: served.port(name)})))
+        with pytest.raises(LiveError, match="cannot listen"):
+            asyncio.run(started(Channels(**{name: 0}, access=Access(host="a..b", token="x" * 16))))
     with pytest.raises(LiveError, match="no channel"):
         Channels(access=Access())
 
 
 def test_addresses_that_are_none_and_servers_that_are_absent_are_told():
-    for address in ("http://127.0.0.1:1/", "udp://127.0.0.1", "udp://127.0.0.1:x"):
+    nowhere = ("http://127.0.0.1:1/", "udp://127.0.0.1", "udp://127.0.0.1:x", "ws://", "ws://127.0.0.1:99999/")
+    for address in nowhere:
         with pytest.raises(LiveError, match="not an address"):
             connect(address)
-    for address in ("unix:/no/such/pipe", "ws://127.0.0.1:9/"):
+    for address in ("unix:/no/such/pipe", "ws://127.0.0.1:9/", "udp://a..b:9"):
         with pytest.raises(LiveError, match="nobody answers"):
             connect(address)
+    with Sender("udp://127.0.0.1:9") as sender, pytest.raises(LiveError, match="nobody answers"):
+        list(sender.replay(LOG.rows(0, 20)))
+
+
+def test_a_server_that_says_nothing_is_not_waited_for(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("tauhat.live.sender._QUIET", 0.1)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        address = f"udp://127.0.0.1:{silent.getsockname()[1]}"
+        with Sender(address) as sender, pytest.raises(LiveError, match=r"nobody answers.*token"):
+            list(sender.replay(LOG.rows(0, 20)))

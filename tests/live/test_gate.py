@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import secrets
 import socket
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 from hypothesis import given
@@ -191,7 +193,7 @@ def test_a_name_that_was_made_to_mean_this_machine_is_refused(opened, host):
 
 @pytest.mark.parametrize("origin", [
     "http://evil.example", "null", "http://127.0.0.1:1", "http://localhost", "file://",
-    "http://127.0.0.1.evil.example", None,
+    "http://127.0.0.1.evil.example", "http://[::1", None,
 ])  # fmt: skip
 def test_pages_of_other_sites_get_no_socket(opened, origin):
     with pytest.raises(InvalidStatus, match="403"), page(opened, origin=origin):
@@ -288,6 +290,64 @@ def _has_room(gate: Gate) -> bool:
         return is_alive(gate)
     except InvalidStatus:  # the gate has not seen yet that the others ended
         return False
+
+
+def test_pages_that_ask_at_once_are_no_more_than_may_be_open(opened):
+    asking = request(
+        opened, Origin=f"http://127.0.0.1:{opened.port}", Upgrade="websocket", Connection="Upgrade",
+        Sec_WebSocket_Key="dGhlIHNhbXBsZSBub25jZQ==", Sec_WebSocket_Version="13", Sec_WebSocket_Protocol=VISER,
+    )  # fmt: skip
+    with ExitStack() as stack:
+        address = ("127.0.0.1", opened.port)
+        asked = [stack.enter_context(socket.create_connection(address, timeout=5.0)) for _ in range(QUICK.waiting)]
+        for connection in asked:
+            connection.sendall(asking[:-2])
+        time.sleep(0.1)
+        for connection in asked:
+            connection.sendall(asking[-2:])
+        answers = sorted(status(_rest(connection)) for connection in asked)
+    assert answers == [101] * QUICK.pages + [503] * (QUICK.waiting - QUICK.pages)
+
+
+def test_a_browser_that_takes_nothing_is_let_go(tmp_path):
+    limits = GateLimits(stalled=0.2)
+    with _endless_page(tmp_path / "door") as place, gate_to(place, limits=limits) as gate:
+        own = f"http://127.0.0.1:{gate.port}"
+        with socket.create_connection(("127.0.0.1", gate.port), timeout=5.0) as connection:
+            connection.sendall(request(gate, Origin=own, Upgrade="websocket", Connection="Upgrade"))
+            until = time.monotonic() + 10.0
+            # its end of the connection is gone, not just forgotten
+            with pytest.raises(OSError, match=r"reset|pipe"):  # noqa: PT012
+                while time.monotonic() < until:
+                    connection.send(b"x")
+                    time.sleep(0.05)
+
+
+@contextmanager
+def _endless_page(place: Path) -> Iterator[Path]:
+    """Serve one connection with bytes as long as somebody takes them."""
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(place))
+        listening.listen(1)
+
+        def pour() -> None:
+            with listening.accept()[0] as connection, suppress(OSError):
+                while True:
+                    connection.sendall(bytes(65536))
+
+        pouring = threading.Thread(target=pour)
+        pouring.start()
+        yield place
+        pouring.join(timeout=10.0)
+        assert not pouring.is_alive()
+
+
+def test_a_token_with_signs_that_addresses_read_otherwise_lets_in(door):
+    with gate_to(door, token="a+secret/of=many~signs.+") as gate:
+        found = urlsplit(gate.url)
+        answer = said(gate, request(gate, f"{found.path}?{found.query}"))
+    assert status(answer) == 200
+    assert b"Set-Cookie" in answer
 
 
 def test_viser_has_no_port_and_its_door_is_its_owners(door):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -137,3 +139,49 @@ def test_a_button_pressed_twice_is_meant_once(server):
         page._ask_for_zero()
     assert page.commands() == ["zero", "zero"]
     assert page.commands() == []
+
+
+def test_a_client_that_came_again_is_looked_at_unless_another_was_chosen_by_hand(server):
+    from tauhat.report.live_page import LivePage
+
+    now = [0.0]
+    robot = load_robot("two_link")
+    page = LivePage(server, robot, clock=lambda: now[0])
+
+    def looked_at(moment: float, stream: str) -> str:
+        now[0] = moment
+        page.show(reading(robot, np.zeros(2), np.zeros(3), np.eye(3), stream=stream, t=moment))
+        return str(page._choice.value)
+
+    assert looked_at(0.0, "first") == "first"
+    assert looked_at(0.1, "beside") == "first"
+    assert looked_at(0.5, "first") == "first"
+    assert looked_at(9.0, "beside") == "first"  # it ran before: nobody mistakes one robot for another
+    assert looked_at(9.1, "again") == "again"
+    page._choice.value = "first"
+    page._hear_choice(SimpleNamespace(client=object()))
+    assert looked_at(20.0, "third") == "first"
+
+
+def test_a_page_may_press_and_choose_and_nothing_else(server):
+    """What viser would take beside it: any attribute of a button, and files that nobody asked for."""
+    from viser import _messages as messages
+
+    button = server.gui.add_button("Zero")
+    pressed: list[object] = []
+    button.on_click(pressed.append)
+    interface = server.gui._websock_interface
+
+    def told(message: Any) -> None:
+        coming = interface._handle_incoming_message(0, message)
+        asyncio.run_coroutine_threadsafe(coming, server._event_loop).result(timeout=5.0)
+
+    uuid, props = button._impl.uuid, button._impl.props
+    for updates in ({"props": 5}, {"value": True, "removed": True}, 5):
+        told(messages.GuiUpdateMessage(uuid, updates))
+    told(messages.FileTransferStartUpload(uuid, "x", "name", "text/plain", part_count=9, size_bytes=9))
+    assert button._impl.props is props
+    assert not button._impl.removed
+    assert server.gui._current_file_upload_states == {}
+    told(messages.GuiUpdateMessage(uuid, {"value": True}))
+    assert button.value is True

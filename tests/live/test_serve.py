@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import runpy
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -63,6 +64,27 @@ def test_samples_are_answered_until_sigterm_and_nothing_is_left_behind(folder: P
     assert errors == "done: 3 clients, 400 taken\n"
     assert not (folder / "s").exists()
     assert document["robot"] == "two_link"
+
+
+def test_a_client_that_leaves_without_reading_ends_nothing(folder: Path):
+    """Its answers are written to a socket that nobody reads, which ends the programs of a command line."""
+    words = ["serve", folder / "estimate.json", "--rate", RATE, "--pipe", folder / "left", "--no-page", "--json"]
+    sample = json.dumps({"t": 0.0, "q": [0.0, 0.0], "tau": [0.0, 0.0]}).encode() + b"\n"
+    command = [sys.executable, "-m", "tauhat", *map(str, words)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        while process.stdout.readline() != "}\n":
+            assert process.poll() is None
+        for _ in range(4):  # of the eight who may be there at a time
+            with socket.socket(socket.AF_UNIX) as leaving:
+                leaving.connect(str(folder / "left"))
+                leaving.sendall(50 * sample)
+        with Sender(f"unix:{folder / 'left'}") as staying:
+            answers = list(staying.replay(read_recording(folder / "log.parquet").rows(0, 50), speed=np.inf))
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=10.0)
+    assert len(answers) == 50
+    assert process.returncode == 0
 
 
 def test_the_example_replays_a_log(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hmac
 import re
 import secrets
+import stat
 from dataclasses import dataclass, field
 from ipaddress import ip_address
 from pathlib import Path
@@ -110,9 +111,10 @@ def read_token(path: Path) -> str:
         when the file cannot be read, is no text, or others than its owner may read it.
     """
     try:
-        if not path.is_file():  # a pipe would be waited for
-            raise LiveError("no file with a token", where=path, got="something else" if path.exists() else "nothing there")
-        if path.stat().st_mode & 0o077:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):  # a pipe would be waited for
+            raise LiveError("the token cannot be read", where=path, expected="a plain file", got="something else")
+        if mode & 0o077:
             raise LiveError("others may read the token", where=path, expected="mode 0600", remedy=f"chmod 600 {path}")
         with path.open(encoding="ascii") as file:
             return file.read(_LONGEST + 3).strip()

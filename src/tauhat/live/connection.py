@@ -210,7 +210,8 @@ class WebSocketConnection(Connection):
             raise LiveError("the server refused the handshake", where=address, got=self._protocol.handshake_exc)
 
     def _framed(self, text: str) -> bytes:
-        self._protocol.send_text(text.encode())
+        if self._protocol.state.name == "OPEN":  # else nobody listens; what was said before can still be read
+            self._protocol.send_text(text.encode())
         return self._drained()
 
     def _messages(self, data: bytes) -> list[str]:

@@ -140,7 +140,9 @@ class Sender:
     def _check_greeted(self) -> None:
         if not self.hello:  # over UDP a server says nothing to whoever does not know its token
             raise LiveError(
-                "nobody answers", where=self.address, remedy="check the address, and the token if the server asks for one"
+                "nobody answers",
+                where=self.address,
+                remedy="check the address, and the token if the server asks for one",
             )
 
     @property

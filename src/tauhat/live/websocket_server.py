@@ -116,7 +116,8 @@ async def serve_websocket(clients: Clients, access: Access, *, port: int) -> tup
             write_limit=limits.buffer, logger=_LOG,
         )  # fmt: skip
     except (OSError, UnicodeError) as error:
-        reason = os.strerror(error.errno) if isinstance(error, OSError) and (error.errno or 0) > 0 else str(error)
+        number = error.errno or 0 if isinstance(error, OSError) else 0
+        reason = os.strerror(number) if number > 0 else str(error)
         raise LiveError(
             "cannot listen for WebSockets", where=f"{access.host}:{port}", got=reason,
             remedy="choose another port or host",
@@ -125,17 +126,12 @@ async def serve_websocket(clients: Clients, access: Access, *, port: int) -> tup
 
 
 async def _closed(connection: ServerConnection) -> None:
-    """Close a connection; what its client still says is read past, since its farewell comes behind that.
-
-    The library waits without end for a client that reads nothing, so its connection is broken off in time.
-    """
-    breaking = asyncio.get_running_loop().call_later(2.0 * _FAREWELL, connection.transport.abort)
+    """Close a connection; what its client still says is read past, since its farewell comes behind that."""
     closing = asyncio.ensure_future(connection.close())
     with suppress(ConnectionClosed):
         while True:
             await connection.recv(decode=False)
     await closing
-    breaking.cancel()
 
 
 def _judged(connection: ServerConnection, request: Request, *, access: Access) -> Response | None:

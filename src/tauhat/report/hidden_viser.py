@@ -44,6 +44,7 @@ def hidden_server(door: Path) -> Any:
         server = viser.ViserServer(host="hidden", port=0, label="tauhat", verbose=False)
     # Any page may ask viser for a tunnel through a server of others, which would go round whatever guards the door.
     server.request_share_url = _no_tunnel
+    _take_only_values(server)
     return server
 
 
@@ -72,6 +73,23 @@ def page_headers(host: str) -> dict[str, str]:
         "Referrer-Policy": "no-referrer",
         "Cache-Control": "no-store",
     }
+
+
+def _take_only_values(server: Any) -> None:
+    """Let pages set values and press buttons, and nothing else.
+
+    viser would let a page write any attribute of a button or a list, and upload files to it that nobody asked for,
+    until memory is full. The camera is told on another way.
+    """
+    interface = server.gui._websock_interface  # noqa: SLF001 - viser has no public way to refuse a message
+    plain = interface._handle_incoming_message  # noqa: SLF001
+
+    async def handle(client: int, message: Any) -> None:
+        updates = getattr(message, "updates", None)
+        if type(message).__name__ == "GuiUpdateMessage" and isinstance(updates, dict) and updates.keys() == {"value"}:
+            await plain(client, message)
+
+    interface._handle_incoming_message = handle  # noqa: SLF001
 
 
 def _no_tunnel(*_given: Any, **_named: Any) -> None:

@@ -78,11 +78,11 @@ class Reading(Protocol):
 
 
 class _Stream:
-    """What is kept of one stream: its newest reading, when its time last went on, its last seconds, its contacts."""
+    """What is kept of one stream: newest reading, when it began and last went on, its last seconds, its contacts."""
 
-    def __init__(self, n_v: int) -> None:
+    def __init__(self, n_v: int, now: float) -> None:
         self.newest: Reading | None = None
-        self.alive_at = 0.0
+        self.began_at = self.alive_at = now
         self.history = History(n_v)
         self.contacts = ContactLog()
 
@@ -129,6 +129,9 @@ class LivePage:
         gui.add_html(STYLE)
         self._status = gui.add_html(status_html("waiting", "waiting for the first sample", ""))
         self._choice = gui.add_dropdown("Stream", ("",), visible=False)
+        self._choice.on_update(self._hear_choice)
+        self._chosen = ""  # by hand
+        self._plotted: Reading | None = None
         self._wrench = gui.add_html("")
         self._zero = gui.add_button("Zero", hint=_HINT, icon="circle")
         self._zero.on_click(lambda _: self._ask_for_zero())
@@ -139,10 +142,12 @@ class LivePage:
 
     def show(self, reading: Reading) -> None:
         """Take a reading, and draw the arm and the force if its stream is the one that is looked at."""
+        now = self._clock()
         stream = self._streams.get(reading.stream)
         if stream is None:
-            stream = self._begin(reading.stream)
-        stream.take(reading, self._clock())
+            stream = self._begin(reading.stream, now)
+        stream.take(reading, now)
+        self._follow(reading.stream, now)
         if stream is self._seen():
             error = self._error(reading, stream.history)
             self._scene.show(reading.q, np.asarray(reading.wrench)[:3], error, scale=self._scale)
@@ -163,8 +168,9 @@ class LivePage:
             self._contacts.content = contacts_html(stream.contacts.contacts)
             self._counts.content = counts_html(reading.counts)
             self._say_state(stream, reading, now)
-            if now - stream.alive_at < _SILENT:
+            if now - stream.alive_at < _SILENT or self._plotted is not reading:
                 self._plots.show(stream.history)
+                self._plotted = reading
 
     def commands(self) -> list[str]:
         """Return what was asked for on the page since the last call: `zero`."""
@@ -173,14 +179,29 @@ class LivePage:
             asked.append(self._commands.popleft())
         return asked
 
-    def _begin(self, name: str) -> _Stream:
+    def _begin(self, name: str, now: float) -> _Stream:
         """Return a new stream; of too many, the one that has been silent longest is forgotten."""
         if len(self._streams) >= _MOST_STREAMS:
             del self._streams[min(self._streams, key=lambda known: self._streams[known].alive_at)]
-        self._streams[name] = stream = _Stream(self._robot.n_v)
+        self._streams[name] = stream = _Stream(self._robot.n_v, now)
         self._choice.options = tuple(self._streams)
         self._choice.visible = len(self._streams) > 1
         return stream
+
+    def _follow(self, name: str, now: float) -> None:
+        """Look at this stream if it began after the one that is looked at fell silent: a client that came again.
+
+        A stream that was chosen by hand stays, and none that ran beside it takes its place.
+        """
+        seen = self._seen()
+        if seen is not None and (self._choice.value == self._chosen or now - seen.alive_at < _SILENT):
+            return
+        if seen is None or self._streams[name].began_at > seen.alive_at:
+            self._choice.value = name
+
+    def _hear_choice(self, event: Any) -> None:
+        if event.client is not None:
+            self._chosen = self._choice.value
 
     def _seen(self) -> _Stream | None:
         return self._streams.get(self._choice.value)
@@ -203,7 +224,7 @@ class LivePage:
             place = direction_text(error.axes[:, -1])
             state, words = "wide", f"live, error bar too wide: ± {error.widest:.0f} N along {place}"
         else:
-            state, words = "live", "live"
+            state, words = "live", f"live, contact at {reading.contact}" if reading.contact else "live"
         where = f"{reading.stream}, t = {reading.t:.1f} s"
         self._status.content = status_html(state, words, where)
         self._notes.content = boxed(f'<span class="faint">{self._caption(reading, error, now)}</span>')

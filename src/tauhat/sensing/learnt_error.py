@@ -12,7 +12,6 @@ from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import SensingError
 from tauhat.sensing.sensor import ForceSensor
 
-
 _SAME = 0.01  # share to which two settings are one
 
 
@@ -39,9 +38,10 @@ class SensorSettings(NamedTuple):
         found = settings_of(sensor)
         pairs = ((self.gain, found.gain), (self.cutoff, found.cutoff))
         if self.observer != found.observer or any(abs(a - b) > _SAME * a for a, b in pairs):
+            options = f"--observer {self.observer} --gain {self.gain:g} --cutoff {self.cutoff:g}"
             raise SensingError(
                 "an error learnt with another sensor", expected=str(self), got=str(found),
-                remedy=f"--observer {self.observer} --gain {self.gain:g} --cutoff {self.cutoff:g}, or learn again (--free)",
+                remedy=f"{options}, or learn again (--free)",
             )  # fmt: skip
 
     def __str__(self) -> str:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tauhat.cli.current_options import ConstantsOption, currents_of
 from tauhat.cli.broken_pipes import outliving_readers
+from tauhat.cli.current_options import ConstantsOption, currents_of
 from tauhat.cli.options import EstimateArgument, JsonOption, MapOption, frequency
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import say, working

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tauhat.studies.polishing.arm import WARMTHS, Warmth
-from tauhat.studies.polishing.findings import Findings, finished, spread
+from tauhat.studies.polishing.findings import Findings, Spread, finished, spread
 from tauhat.studies.polishing.sensing_ways import LOAD_CELL, NO_WARMTH, OPEN_LOOP, WITH_WARMTH
-from tauhat.studies.polishing.trials import GLOBAL, LOCAL
+from tauhat.studies.polishing.trials import GLOBAL, LOCAL, Outcome
 from tauhat.studies.polishing.truth import Difficulty
 from tauhat.studies.polishing.work import SHAPES
 from tauhat.studies.study import Cell, Chapter, Chart, Series, Table
@@ -103,9 +103,9 @@ def _forces(found: Findings, difficulty: Difficulty) -> Table:
         for warmth in WARMTHS:
             jobs = found.of(name, difficulty, warmth)
             rms, bias = spread(jobs), spread(jobs, "bias")
-            row += [rms.median, f"{rms.low:.3g} to {rms.high:.3g}", rms.largest, bias.median, finished(jobs)]
+            row += [rms.median, _between(rms), rms.largest, bias.median, finished(jobs)]
         jobs = [*found.of(name, difficulty, "cold"), *found.of(name, difficulty, "warm")]
-        row += [spread(jobs, "read", 1.0).median, float(np.nanmean([100.0 * job.inside for job in jobs] or [np.nan]))]
+        row += [spread(jobs, "read", 1.0).median, _inside(jobs)]
         rows.append(tuple(row))
     what = ("RMS [%]", "quartiles", "worst", "bias [%]", "done")
     return Table(
@@ -115,6 +115,15 @@ def _forces(found: Findings, difficulty: Difficulty) -> Table:
         note="RMS and mean error of the true force over the commanded one, over jobs that were done to their end; "
         "`done` names why others were given up. Inside: 95 % error bars of the reading that hold the true force.",
     )
+
+
+def _between(figures: Spread) -> str:
+    return f"{figures.low:.3g} to {figures.high:.3g}" if np.isfinite(figures.low) else "-"
+
+
+def _inside(jobs: list[Outcome]) -> float:
+    shares = [100.0 * job.inside for job in jobs if np.isfinite(job.inside)]
+    return float(np.mean(shares)) if shares else np.nan
 
 
 def _bar(found: Findings, difficulty: Difficulty, warmth: Warmth) -> Series:
@@ -175,7 +184,7 @@ def local_chapter(found: Findings) -> Chapter:
             for warmth in WARMTHS:
                 jobs = found.of(name, "easy", warmth, calibration=calibration)
                 figures = spread(jobs)
-                row += [figures.median, f"{figures.low:.3g} to {figures.high:.3g}", finished(jobs)]
+                row += [figures.median, _between(figures), finished(jobs)]
             rows.append(tuple(row))
     table = Table(
         title="Calibrated through the whole room, and where the work is",
