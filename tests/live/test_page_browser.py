@@ -18,7 +18,7 @@ from devtools import Tab, browsing, find_browser
 from tauhat.errors import LiveError
 from tauhat.live.access import Access
 from tauhat.live.feed import Snapshot
-from tauhat.live.page_process import PageProcess, start_page
+from tauhat.live.page_process import PageProcess, _deaf_to_interrupts, start_page
 from tauhat.robots import load_robot
 
 pytest.importorskip("viser", reason="viser is not installed: there is no page")
@@ -159,7 +159,9 @@ def test_a_page_that_died_is_no_error(tmp_path):
 
 def test_a_port_that_is_taken_is_said_in_one_line(page):
     port = int(page.url.split(":")[2].partition("/")[0])
-    with pytest.raises(LiveError, match=f"page: the page's address cannot be used; got 127.0.0.1, port {port}"):
+    with pytest.raises(
+        LiveError, match=rf"^page: 127.0.0.1, port {port}: .* cannot be used; got Address already in use; "
+    ):
         start_page(load_robot("panda"), port=port)
 
 
@@ -206,6 +208,16 @@ def test_the_page_says_nothing_on_the_servers_output_and_leaves_nothing_behind(t
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60.0, check=True)
     assert (done.stdout, done.stderr) == ("said\n", "")
     assert [place.name for place in (tmp_path / "own").iterdir() if place.name.startswith("tauhat-")] == []
+
+
+def test_ctrl_c_is_the_servers_from_the_pages_first_moment():
+    """While it still loads its libraries, an interrupt would end it with twenty lines about them."""
+    told = [sys.executable, "-c", "import signal; print(signal.getsignal(signal.SIGINT).name)"]
+    before = signal.getsignal(signal.SIGINT)
+    with _deaf_to_interrupts():
+        process = subprocess.Popen(told, stdout=subprocess.PIPE, text=True)
+    assert signal.getsignal(signal.SIGINT) is before
+    assert process.communicate(timeout=20.0)[0] == "SIG_IGN\n"
 
 
 def _runs(process: int) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -14,8 +15,8 @@ def outliving_readers() -> Iterator[None]:
     Elsewhere such a write ends the program without a word, as `tauhat ... | head` is to end. A server would end so with
     the first client that leaves before it has read its answers.
     """
-    if not hasattr(signal, "SIGPIPE"):
-        yield  # Windows knows no such signal
+    if sys.platform == "win32":  # which knows no such signal
+        yield
         return
     before = signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     try:

@@ -18,6 +18,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from tauhat.errors import LiveError
+from tauhat.live.reasons import reason_of
 
 LOOPBACK = "127.0.0.1"
 _SHORTEST = 16  # [characters] of a token: 96 bits where they are of base 64
@@ -119,11 +120,11 @@ def read_token(path: Path) -> str:
         with path.open(encoding="ascii") as file:
             return file.read(_LONGEST + 3).strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise LiveError("the token cannot be read", where=path, got=_reason(error)) from error
-
-
-def _reason(error: Exception) -> str:
-    return (error.strerror if isinstance(error, OSError) else None) or "no text"
+        raise LiveError(
+            "the token cannot be read",
+            where=path,
+            got="no text" if isinstance(error, UnicodeError) else reason_of(error),
+        ) from error
 
 
 def _is_token(text: str) -> bool:

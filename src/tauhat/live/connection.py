@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from tauhat.errors import LiveError, MissingExtraError
+from tauhat.live.reasons import reason_of
 
 _PIECE = 65536  # [bytes] taken from the system at a time
 _OPENING = 5.0  # [s]
@@ -254,8 +255,7 @@ def connect(address: str) -> Connection:
     try:
         found: Connection = ways[scheme]()
     except (OSError, UnicodeError) as error:
-        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        raise LiveError("nobody answers", where=address, got=reason) from error
+        raise LiveError("nobody answers", where=address, got=reason_of(error)) from error
     return found
 
 

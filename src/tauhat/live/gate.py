@@ -20,6 +20,7 @@ from urllib.parse import parse_qs, quote
 
 from tauhat.errors import LiveError, OutputError
 from tauhat.live.access import Access
+from tauhat.live.reasons import reason_of
 from tauhat.live.request_head import Answer, RequestHead, read_head
 
 _PIECE = 65536  # [bytes] handed on at a time
@@ -250,10 +251,6 @@ def _bound(host: str, port: int) -> socket.socket:
         return socket.create_server(address[:2], family=family, backlog=64)
     except (OSError, OverflowError, UnicodeError) as error:
         raise OutputError(
-            "the page's address cannot be used", where=f"{host}, port {port}", got=_reason(error),
+            "the page's address cannot be used", where=f"{host}, port {port}", got=reason_of(error),
             remedy="choose another port or host",
         ) from error  # fmt: skip
-
-
-def _reason(error: Exception) -> str:
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)

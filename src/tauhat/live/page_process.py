@@ -13,6 +13,8 @@ import signal
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -145,7 +147,8 @@ def start_page(
     ours, theirs = context.Pipe()
     settings = _Settings(robot, frame, axes, port, access or Access())
     process = context.Process(target=_serve_page, args=(theirs, settings), name="page", daemon=True)
-    process.start()
+    with _deaf_to_interrupts():
+        process.start()
     theirs.close()
     try:
         first = ours.recv_bytes(_LONGEST).decode() if ours.poll(_BEGIN) else "it took too long"
@@ -158,6 +161,19 @@ def start_page(
     process.kill()
     process.join(timeout=_END)
     raise LiveError(first, where="page")
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Let a process begin that is deaf to Ctrl-C: a terminal sends it to both, and the server ends both."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # which alone hears it
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _serve_page(connection: Connection, settings: _Settings) -> None:

@@ -18,6 +18,7 @@ from tauhat.errors import LiveError, TauhatError
 from tauhat.live.access import Access
 from tauhat.live.clients import Client, Clients
 from tauhat.live.protocol import decoded, refusal_text
+from tauhat.live.reasons import reason_of
 from tauhat.live.throttle import Throttle
 
 _STRANGERS = 10_000.0  # datagrams a second of unknown addresses that are looked into
@@ -60,10 +61,10 @@ class UdpServer:
             self._socket.bind(address)
         except (OSError, UnicodeError) as error:
             self.close()
-            reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
             raise LiveError(
-                "cannot listen for datagrams", where=f"{host}:{port}", got=reason, remedy="choose another port or host"
-            ) from error
+                "cannot listen for datagrams", where=f"{host}:{port}", got=reason_of(error),
+                remedy="choose another port or host",
+            ) from error  # fmt: skip
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _KERNEL)
         self._loop.add_reader(self._socket, self._read, self._socket)

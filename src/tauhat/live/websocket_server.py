@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import socket
 from contextlib import suppress
 from functools import partial
@@ -15,6 +14,7 @@ from tauhat.errors import LiveError, MissingExtraError
 from tauhat.live.access import Access
 from tauhat.live.clients import Clients
 from tauhat.live.conversation import converse
+from tauhat.live.reasons import reason_of
 
 try:
     from websockets.asyncio.server import Server, ServerConnection, serve
@@ -116,10 +116,8 @@ async def serve_websocket(clients: Clients, access: Access, *, port: int) -> tup
             write_limit=limits.buffer, logger=_LOG,
         )  # fmt: skip
     except (OSError, UnicodeError) as error:
-        number = error.errno or 0 if isinstance(error, OSError) else 0
-        reason = os.strerror(number) if number > 0 else str(error)
         raise LiveError(
-            "cannot listen for WebSockets", where=f"{access.host}:{port}", got=reason,
+            "cannot listen for WebSockets", where=f"{access.host}:{port}", got=reason_of(error),
             remedy="choose another port or host",
         ) from error  # fmt: skip
     return server, next(iter(server.sockets)).getsockname()[1]

@@ -110,7 +110,7 @@ def torque_columns(table: FloatArray) -> tuple[FloatArray, ...]:
 
 def _plot(gui: Any, columns: tuple[FloatArray, ...], series: list[dict[str, Any]], *, bands: Any) -> Any:
     # uPlot leaves the labels of an axis out whose range is fixed, until it changes: words below stand for them.
-    axes = ({"show": False}, {"size": 44, "space": 26, "font": "11px sans-serif"})
+    axes = ({"show": False}, {"size": 58, "space": 26, "font": "11px sans-serif"})
     plot = gui.add_uplot(
         data=columns,
         series=tuple(series),
