@@ -340,7 +340,7 @@ def test_the_command_records_and_prints_one_json_document(tmp_path):
         assert document["map"] == str(tmp_path / "run.map.toml")
         code, printed, _ = command("record", *words[:-2], "--map", document["map"], "-o", tmp_path / "again.parquet")
         assert code == 0
-        assert f"Their map: {tmp_path / 'again.map.toml'}" in " ".join(printed.split())
+        assert f"Theirmap:{tmp_path / 'again.map.toml'}" in "".join(printed.split())  # long paths are broken
 
 
 def test_the_command_refuses_in_one_line_what_it_cannot_record(tmp_path):
