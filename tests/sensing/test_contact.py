@@ -47,7 +47,7 @@ def sensed(tau: np.ndarray, dq: np.ndarray | float = 0.5, std: float = 1.0) -> S
         name="run", joint_names=NAMES, prismatic=(), frame="tool", axes="base", step=STEP, t=STEP * np.arange(n_t),
         rows=np.arange(n_t), q=np.cumsum(speed, axis=0) * STEP, dq=speed, tau=tau, tau_std=np.full_like(tau, std),
         raw=tau.copy(), wrench=wrench, wrench_std=np.ones((n_t, 6)), settled=np.ones(n_t, dtype=bool),
-        counts=SampleCounts(taken=n_t), lag=np.zeros_like(tau),
+        counts=SampleCounts(taken=n_t), lag=np.zeros_like(tau), force_shared=np.zeros((n_t, 3)),
     )  # fmt: skip
 
 
@@ -257,6 +257,7 @@ def with_robot(q: np.ndarray, tau: np.ndarray) -> SensedLog:
         t=STEP * np.arange(n_t), rows=np.arange(n_t), q=q, dq=np.gradient(q, STEP, axis=0), tau=tau,
         tau_std=np.ones_like(tau), raw=tau, wrench=np.zeros((n_t, 6)), wrench_std=np.ones((n_t, 6)),
         settled=np.ones(n_t, dtype=bool), counts=SampleCounts(taken=n_t), lag=np.zeros_like(tau),
+        force_shared=np.zeros((n_t, 3)),
     )  # fmt: skip
 
 

@@ -9,11 +9,15 @@ import pytest
 from sensed_arms import frictionless, motion
 
 from tauhat.dynamics.passive_kernel import DAHL, joint_elements
+from tauhat.dynamics.rigid_body import gravity_torque
 from tauhat.errors import SensingError
 from tauhat.recordings import Recording
 from tauhat.sensing import ForceSensor, WrenchSolver, directions_named
+from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
+from tauhat.sensing.contact_rules import ContactRules
 from tauhat.sensing.free_motion import learnt_from_free_motion, shrunk_correlation
-from tauhat.sensing.zero import zeroed
+from tauhat.sensing.judged_log import judged_log
+from tauhat.sensing.zero import NO_ZERO, zeroed
 
 RATE, SECONDS = 100.0, 2.2
 MODEL = frictionless()
@@ -130,6 +134,50 @@ def test_logs_that_end_before_their_start_is_forgotten_teach_nothing():
     alone, beside = (learnt_from_free_motion(SENSOR, given) for given in ([long], [long, short, short, short]))
     assert (beside.model.stretch == alone.model.stretch).all()
     assert (beside.solver.correlation == alone.solver.correlation).all()
+
+
+def test_logs_count_by_their_time_and_not_by_their_samples():
+    offsets = np.random.default_rng(7).normal(size=(12, 7)) * SIZES * np.repeat([3.0, 1.0], 6)[:, None]
+    q, tau = motion(MODEL.robot, SECONDS, 1.9 * RATE)
+    fine = np.arange(len(q)) / (1.9 * RATE)
+    coarse = [Recording(t=T, q=Q, tau=TAU + offset) for offset in offsets]
+    finer = [Recording(t=fine, q=q, tau=tau + offset) for offset in offsets[:6]]
+    expected, found = (learnt_from_free_motion(SENSOR, given) for given in (coarse, [*finer, *coarse[6:]]))
+    assert found.model.stretch == pytest.approx(expected.model.stretch, rel=0.01)
+    assert found.solver.correlation == pytest.approx(expected.solver.correlation, abs=0.01)
+    some = np.random.default_rng(8).normal(size=(5, 40, 3))
+    twice = [np.repeat(some[0], 2, axis=0), *some[1:]]
+    assert shrunk_correlation(twice, seconds=np.ones(5)) == pytest.approx(shrunk_correlation(list(some)), abs=1e-12)
+
+
+def standing(n: int, seed: int) -> list[Recording]:
+    """Return logs of an arm that stands for five seconds, held by a friction of its own."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(500) / RATE
+    held = np.tile(Q[0], (500, 1)), np.tile(rnea_at_rest(), (500, 1))
+    return [
+        Recording(t=t, q=held[0], tau=held[1] + rng.normal(size=7) * SIZES + 0.05 * rng.normal(size=(500, 7)))
+        for _ in range(n)
+    ]
+
+
+def rnea_at_rest() -> np.ndarray:
+    return gravity_torque(MODEL.robot, Q[:1])[0]
+
+
+def test_an_error_is_that_of_what_is_told_less_the_zero_of_standing():
+    sensor = replace(SENSOR, model=replace(MODEL, rms=np.full(7, 0.01)))
+    plain = learnt_from_free_motion(sensor, standing(8, 1))
+    less = learnt_from_free_motion(sensor, standing(8, 1), standing=ContactRules())
+    assert (less.model.rms < 0.2 * plain.model.rms).all()
+    limits = assumed_contact_thresholds(less)
+    held = []
+    for log in standing(20, 2):
+        found = judged_log(less, log, limits, zero="standing").sensed
+        held.append(np.abs(found.tau[found.settled]) < 1.96 * found.tau_std[found.settled])
+    assert np.mean(held) == pytest.approx(0.95, abs=0.04)
+    none = learnt_from_free_motion(sensor, standing(8, 1), standing=ContactRules(zero=NO_ZERO))
+    assert (none.model.rms == plain.model.rms).all()
 
 
 def test_what_was_learnt_before_does_not_change_what_is_learnt():

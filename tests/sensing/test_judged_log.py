@@ -14,6 +14,7 @@ from tauhat.report.contact_words import zero_words
 from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
 from tauhat.sensing.hidden import hidden_along
 from tauhat.sensing.judged_log import judged_log
+from tauhat.sensing.learnt_error import error_of
 from tauhat.sensing.observers import observer_named
 from tauhat.sensing.sensor import ForceSensor
 from tauhat.sensing.wrench import DIRECTIONS, WrenchSolver
@@ -77,6 +78,13 @@ def test_thresholds_behind_a_pass_are_refused_without_one():
         judged_log(SENSOR, log(0.0, 5.0), replace(LIMITS, taken_off="air"))
 
 
+def test_error_bars_behind_a_standing_zero_are_refused_where_it_is_not_taken_off():
+    limits = replace(LIMITS, error=error_of(SENSOR, zero="standing"))
+    with pytest.raises(SensingError, match="behind a standing zero"):
+        judged_log(SENSOR, log(0.0, 5.0), limits)
+    assert judged_log(SENSOR, log(0.0, 5.0), limits, zero="standing").zero == "standing"
+
+
 def weighing(mass: float, begin: float) -> Recording:
     free = log(0.0, 16.0)
     weight = np.array([SOLVER.jacobian(q)[0][:3].T @ [0.0, 0.0, -9.81 * mass] for q in free.q])
@@ -102,6 +110,33 @@ def test_a_peak_has_the_error_bar_of_its_direction():
     inside = (sensed.t >= event.start) & (sensed.t <= event.end)
     errors = sensed.wrench_std[inside, :3]
     assert errors.min() <= event.peak_std <= errors.max()
+
+
+@pytest.mark.parametrize("solver", [SOLVER, WrenchSolver(robot=MODEL.robot, directions=DIRECTIONS["force"])])
+def test_the_error_of_a_force_along_a_direction_is_that_of_its_whole_covariance(solver):
+    sensed = replace(SENSOR, wrench=solver).along(weighing(3.0, 4.0))
+    again = zeroed(sensed, np.zeros_like(sensed.tau), solver=solver)
+    along = np.random.default_rng(3).normal(size=(sensed.n_t, 3))
+    rows = slice(100, 400)
+    covariance = sensed.solved_by(solver, rows).covariance[:, :3, :3]
+    unit = along[rows] / np.linalg.norm(along[rows], axis=1)[:, None]
+    expected = np.sqrt(np.einsum("ti,tij,tj->t", unit, covariance, unit))
+    apart = np.linalg.norm(unit * sensed.wrench_std[rows, :3], axis=1)
+    assert np.abs(expected / apart - 1.0).max() > 0.2
+    for log in (sensed, again):
+        assert log.force_std(along[rows], rows) == pytest.approx(expected, rel=1e-6)
+    assert sensed.force_std(np.zeros((300, 3)), rows).tolist() == [0.0] * 300
+
+
+def test_a_peak_has_the_error_of_its_own_direction():
+    given = weighing(3.0, 4.0)
+    sensed = SENSOR.along(given)
+    for event in judged_log(SENSOR, given, LIMITS).contacts.events:
+        inside = np.flatnonzero((sensed.t >= event.start) & (sensed.t <= event.end))
+        force = sensed.wrench[inside, :3] - sensed.wrench[max(0, inside[0] - 25), :3]
+        at = int(np.linalg.norm(force, axis=1).argmax())
+        covariance = sensed.solved_by(SOLVER, inside[at : at + 1]).covariance[0, :3, :3]
+        assert event.peak_std == pytest.approx(np.sqrt(force[at] @ covariance @ force[at]) / event.peak, rel=1e-6)
 
 
 def test_what_stands_is_told_less_its_zero():

@@ -11,15 +11,19 @@ import numpy as np
 import pytest
 from sensed_arms import frictionless, motion
 
+from tauhat.dynamics import torque_model
 from tauhat.errors import SensingError, TauhatWarning
+from tauhat.estimation import identify, load_estimate
 from tauhat.recordings import Recording
+from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
 from tauhat.sensing.contact_rules import ContactRules
 from tauhat.sensing.contact_thresholds import ContactThresholds, learn_contact_thresholds, load_contact_thresholds
 from tauhat.sensing.free_logs import sensed_free, settled_seconds
 from tauhat.sensing.free_motion import learnt_from_free_motion
 from tauhat.sensing.learnt_error import LearntError, error_of
 from tauhat.sensing.observers import observer_named
-from tauhat.sensing.sensor import ForceSensor
+from tauhat.sensing.sensed_model import sensed_model
+from tauhat.sensing.sensor import ForceSensor, force_sensor
 from tauhat.sensing.wrench import WrenchSolver
 
 MODEL = frictionless()
@@ -145,6 +149,44 @@ def test_an_error_is_only_that_of_the_observer_and_filter_it_was_learnt_with(cha
     (tmp_path / "limits.json").write_text(json.dumps(data), encoding="utf-8")
     unknown = load_contact_thresholds(tmp_path / "limits.json").sensor_of(replace(SENSOR, **changed))
     assert (unknown.model.rms == SENSOR.model.rms).all()
+
+
+def test_thresholds_know_the_estimate_that_they_were_learnt_with(tmp_path):
+    mine, other = (replace(SENSOR, model=replace(MODEL, estimate=name)) for name in ("mine", "other"))
+    quietly(mine, [free(125.0)]).save(tmp_path / "limits.json")
+    found = load_contact_thresholds(tmp_path / "limits.json")
+    assert found.estimate == "mine"
+    tooled = replace(mine, model=mine.model.carrying(np.array([1.0, *[0.0] * 9])))
+    assert found.sensor_of(tooled).model.estimate == "mine"
+    with pytest.raises(SensingError, match="thresholds of another estimate"):
+        found.sensor_of(other)
+    data = json.loads((tmp_path / "limits.json").read_text(encoding="utf-8"))
+    del data["estimate"]
+    (tmp_path / "limits.json").write_text(json.dumps(data), encoding="utf-8")
+    with pytest.warns(TauhatWarning, match="do not say of which estimate"):
+        load_contact_thresholds(tmp_path / "limits.json").sensor_of(other)
+
+
+@pytest.mark.filterwarnings("ignore:scaled condition number")
+def test_an_estimate_has_the_same_fingerprint_before_and_after_its_file(tmp_path):
+    log, other = (free(125.0, 12.0, seed) for seed in (3, 4))
+    model = torque_model(MODEL.robot, "inertia,viscous")
+    estimate = identify(model, [log])
+    estimate.save(tmp_path / "arm.json")
+    name = sensed_model(estimate).estimate
+    assert sensed_model(load_estimate(tmp_path / "arm.json")).estimate == name
+    assert sensed_model(identify(model, [log])).estimate == name
+    assert sensed_model(identify(model, [other])).estimate != name
+    assert assumed_contact_thresholds(force_sensor(estimate, rate=125.0)).estimate == name
+
+
+def test_the_zero_of_an_error_is_kept_in_the_file(tmp_path):
+    quietly(SENSOR, [free(125.0)], error=error_of(SENSOR, zero="standing")).save(tmp_path / "limits.json")
+    error = load_contact_thresholds(tmp_path / "limits.json").error
+    assert error is not None
+    assert error.zero == "standing"
+    with pytest.raises(SensingError, match="zero of a learnt error"):
+        replace(error, zero="sitting")
 
 
 def test_a_solver_is_kept_when_an_error_is_put_on_its_sensor():

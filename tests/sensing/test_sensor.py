@@ -257,3 +257,8 @@ def test_a_mass_matrix_of_no_body_is_refused_by_the_observer_that_needs_one():
         sensor.along(recording())
     with pytest.raises(SensingError, match="that of no body"):
         sensor.advance(sensor.start(), Q[0], TAU[0])
+
+
+@pytest.mark.parametrize("rate", [13.0, 15.828348684464723])
+def test_the_usual_cutoff_of_a_slow_sensor_is_one_that_its_filter_takes(rate):
+    assert ForceSensor(model=frictionless(), rate=rate).cutoff == pytest.approx(0.45 * rate)

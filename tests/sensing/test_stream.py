@@ -173,6 +173,44 @@ def test_a_rate_that_is_a_little_off_is_taken():
     assert streamed(0.96 * T[:250], Q[:250], TAU[:250])[0].counts == (250, 0, 0, 0, 0, 0, 0)
 
 
+def kept(share: float, seed: int = 0) -> np.ndarray:
+    """Return which of the samples are left when so many are lost, each by itself."""
+    return np.random.default_rng(seed).random(T.size) >= share
+
+
+@pytest.mark.parametrize("lost", [0.3, 0.5, 0.65])
+@pytest.mark.parametrize("jitter", [0.0, 0.1])
+def test_a_stream_that_loses_many_samples_is_not_of_another_rate(lost, jitter):
+    left = kept(lost)
+    t = (1.03 * T + jitter / RATE * np.random.default_rng(1).uniform(-1.0, 1.0, T.size))[left]
+    memory, found = streamed(t, Q[left], TAU[left])
+    assert memory.counts.taken == len(found) == np.count_nonzero(left)
+    assert SENSOR.along(log(t, Q[left], TAU[left])).counts.taken == len(found)
+
+
+def test_one_sample_of_three_lost_is_not_another_rate():
+    """Steps of one and two periods in turn: pairs of them are all of one and a half."""
+    left = np.arange(T.size) % 3 != 1
+    assert usual_step(T[left]) == pytest.approx(1.5 / RATE)
+    assert streamed(T[left], Q[left], TAU[left])[0].counts.taken == np.count_nonzero(left)
+
+
+@pytest.mark.parametrize("factor", [0.25, 0.5, 2.0 / 3.0, 0.8, 1.25, 1.5, 2.0, 3.0, 4.0, 20.0])
+@pytest.mark.parametrize(("lost", "jitter"), [(0.0, 0.0), (0.0, 0.2), (0.3, 0.0), (0.3, 0.2)])
+def test_another_rate_is_refused_however_its_stamps_jitter_and_what_is_lost(factor, lost, jitter):
+    left = kept(lost)
+    t = (factor * (T + jitter / RATE * np.random.default_rng(1).uniform(-1.0, 1.0, T.size)))[left]
+    with pytest.raises(SensingError, match="samples of another rate"):
+        streamed(t, Q[left], TAU[left])
+
+
+def test_gaps_and_a_clock_that_is_set_back_are_not_another_rate():
+    t = T + 0.05 * (np.arange(T.size) // 7) - 100.0 * (np.arange(T.size) >= 500)
+    counts = streamed(t, Q, TAU)[0].counts
+    assert (counts.taken, counts.late) == (T.size - 49, 49)
+    assert counts.restarts > 100
+
+
 def test_a_log_without_one_usable_sample_is_refused():
     with pytest.raises(SensingError, match="no sample of the log can be used"):
         SENSOR.along(log(T, np.full_like(Q, np.nan)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio
 import pytest
+from scipy.linalg import eigh
 
 from sample_arms import random_tree
 from tauhat.errors import ArrayError, RobotError, SensingError
@@ -124,6 +125,32 @@ def test_a_direction_with_a_known_size_is_solved_with_that_prior():
     usual = WrenchSolver(robot=UR5E, directions=DIRECTIONS["force"])
     same = WrenchSolver(robot=UR5E, directions=DIRECTIONS["force"], sizes=np.full(3, usual.largest[0]))
     assert same.at(HOME, tau, variance).wrench == pytest.approx(usual.at(HOME, tau, variance).wrench, abs=1e-12)
+
+
+def test_a_direction_is_hidden_where_the_joints_tell_no_more_of_it_than_its_size():
+    sizes = np.array([300.0, 0.5, 300.0])  # friction of half a newton across, which no joint of this arm can tell
+    solver = WrenchSolver(robot=UR5E, directions=DIRECTIONS["force"], sizes=sizes)
+    covariance = solver.at(HOME, np.zeros(6), np.ones(6)).covariance
+    shares, dual = eigh(covariance[:3, :3], np.diag(sizes**2))  # the prior's own scaling, by SciPy
+    assert np.flatnonzero(shares > 0.5).tolist() == [2]
+    expected = sizes**2 * dual[:, 2]
+    hidden = solver.hidden(covariance)
+    assert hidden.shape == (6, 1)
+    assert np.abs(hidden[:3, 0] @ expected) == pytest.approx(np.linalg.norm(expected))
+    assert np.abs(hidden[3:]).max() < 1e-12
+    sure = solver.at(HOME, np.zeros(6), np.full(6, 1e-4))
+    assert solver.hidden(sure.covariance).shape[1] == 0
+
+
+def test_hidden_directions_are_those_of_the_prior_whatever_directions_were_asked_for():
+    rng = np.random.default_rng(9)
+    mixed = rng.normal(size=(6, 3))
+    solver = WrenchSolver(robot=UR5E, directions=mixed / np.linalg.norm(mixed, axis=0))
+    found = solver.at(HOME, np.zeros(6), np.full(6, 1e12))  # joints that tell nothing: all that may act is hidden
+    hidden = solver.hidden(found.covariance)
+    scaled = mixed / np.repeat(solver.largest, 3)[:, None]
+    assert hidden.T @ hidden == pytest.approx(np.eye(3), abs=1e-9)
+    assert hidden @ (hidden.T @ scaled) == pytest.approx(scaled, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("sizes", [[1.0, 2.0], [1.0, 0.0, 1.0], [1.0, np.nan, 1.0]])

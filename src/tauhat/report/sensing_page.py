@@ -147,10 +147,8 @@ def _sections(log: SensedLog, measured: FloatArray | None, index: int, judged: J
 
 def _size(log: SensedLog) -> tuple[FloatArray, FloatArray]:
     """Return the size of the force and its standard error along its own direction, (n_t,) [N]."""
-    force, errors = log.wrench[:, :3], log.wrench_std[:, :3]
-    size = np.linalg.norm(force, axis=1)
-    towards = force / np.maximum(size, np.finfo(float).tiny)[:, None]
-    return size, np.linalg.norm(towards * errors, axis=1)
+    force = log.wrench[:, :3]
+    return np.linalg.norm(force, axis=1), log.force_std(force, slice(None))
 
 
 def _counted(log: SensedLog) -> str:

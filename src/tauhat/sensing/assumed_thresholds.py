@@ -26,5 +26,5 @@ def assumed_contact_thresholds(sensor: ForceSensor, *, rules: ContactRules | Non
     return ContactThresholds(
         joint_names=sensor.model.robot.joint_names, edges=np.outer(_STEPS, slow),
         limits=np.tile(np.array(_LIMITS)[:, None], sensor.n_v), rules=rules or ContactRules(), rate=np.inf,
-        promised=np.inf, seconds=np.zeros(3), spread=np.nan,
+        promised=np.inf, seconds=np.zeros(3), spread=np.nan, estimate=sensor.model.estimate,
     )  # fmt: skip

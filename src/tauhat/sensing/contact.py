@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from tauhat.arrays import FloatArray, read_only
 from tauhat.errors import SensingError
 from tauhat.sensing.contact_kernel import RESTING, ROWS, SETTLING, STATES, judge
-from tauhat.sensing.contact_thresholds import CONDITIONS, ContactThresholds, judged_rows
+from tauhat.sensing.contact_thresholds import CONDITIONS, ContactThresholds
+from tauhat.sensing.judged_rows import judged_rows
 from tauhat.sensing.payload_check import PayloadCheck
 from tauhat.sensing.sensed_log import SensedLog
+from tauhat.sensing.sensor import OFF_RATE
 
 _BEFORE = 0.2  # seconds before the start of a contact: what is sensed there is not its
-_OFF_RATE = 0.05  # a clock further off than this is another one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,7 +166,7 @@ class ContactDetector:
             when the thresholds are of other joints or the log is of another rate.
         """
         self.check_joints(log.joint_names, where=log.name)
-        if not abs(log.step / self.step - 1.0) < _OFF_RATE:
+        if not abs(log.step / self.step - 1.0) <= OFF_RATE:
             raise SensingError(
                 "samples of another rate", where=log.name, expected=f"{self.step} s", got=f"{log.step} s"
             )
@@ -190,10 +191,9 @@ class ContactDetector:
         force = log.wrench[span, :3] - log.wrench[before, :3]
         sizes = np.linalg.norm(force, axis=1)
         at = int(sizes.argmax())
-        towards = force[at] / max(float(sizes[at]), np.finfo(float).tiny)
         return ContactEvent(
             start=float(log.t[span.start]), end=float(log.t[span.stop - 1]), link=self._link(told[span].max(axis=0)),
-            peak=float(sizes[at]), peak_std=float(np.linalg.norm(towards * log.wrench_std[span.start + at, :3])),
+            peak=float(sizes[at]), peak_std=float(log.force_std(force, span)[at]),
             excess=float(out[top, 1]),
             torque=log.tau[top] - zero[top], fast=bool(out[span, 3].any()), open=bool(span.stop == log.n_t),
         )  # fmt: skip

@@ -29,9 +29,10 @@ from tauhat.files import read_text, write_text
 from tauhat.plain_data import without_infinities
 from tauhat.recordings.log import Log
 from tauhat.recordings.recording import Recording
-from tauhat.sensing.contact_kernel import MOVING, RESTING, ROWS, SETTLING, STATES, judge_along
+from tauhat.sensing.contact_kernel import MOVING, RESTING, SETTLING
 from tauhat.sensing.contact_rules import ContactRules
 from tauhat.sensing.free_logs import sensed_free
+from tauhat.sensing.judged_rows import free_rows
 from tauhat.sensing.learnt_error import LearntError, error_of, learnt_error
 from tauhat.sensing.sensed_log import SensedLog
 from tauhat.sensing.sensor import ForceSensor
@@ -45,7 +46,6 @@ SCHEMA, SCHEMA_VERSION = "tauhat/contact-thresholds", 2
 _STEPS = (0.3, 1.0)  # of each joint's top speed in free motion, where steps of its scale end
 _FEWEST = 0.5  # seconds of a condition that give a scale of its own
 _HOUR = 3600.0
-_OUT_OF_REACH = 1e12  # limits with which nothing counts as contact, as is known of free motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,6 +62,7 @@ class ContactThresholds:
     spread : largest residual of one recording over that of the others; nan with a single one
     error : of the sensor, in whose standard errors the limits are; None: whatever the sensor has
     taken_off : what has to be taken off the torque before it is judged
+    estimate : fingerprint of the estimate they were learnt with (`SensedModel.estimate`); empty: nobody knows
     """
 
     joint_names: tuple[str, ...]
@@ -74,6 +75,7 @@ class ContactThresholds:
     spread: float
     error: LearntError | None = None
     taken_off: TakenOff = "nothing"
+    estimate: str = ""
 
     def __post_init__(self) -> None:
         n_v, where = len(self.joint_names), "contact thresholds"
@@ -100,10 +102,28 @@ class ContactThresholds:
         Raises
         ------
         SensingError
-            when the sensor has other joints, or observes or filters otherwise.
+            when the sensor has other joints or another estimate, or observes or filters otherwise.
+
+        Warns
+        -----
+        TauhatWarning
+            when the thresholds do not say of which estimate they are.
         """
         self.check_joints(sensor.model.robot.joint_names, where="sensor")
+        self._check_estimate(sensor.model.estimate)
         return sensor if self.error is None else self.error.on(sensor)
+
+    def _check_estimate(self, other: str) -> None:
+        if other and not self.estimate:
+            warnings.warn(
+                "the thresholds do not say of which estimate they are: with another one they are wrong",
+                TauhatWarning, stacklevel=3,
+            )  # fmt: skip
+        if other and self.estimate and other != self.estimate:
+            raise SensingError(
+                "thresholds of another estimate", where="sensor", expected=self.estimate, got=other,
+                remedy="sense with the estimate that they were learnt with, or learn them again (--free)",
+            )  # fmt: skip
 
     def check_joints(self, names: tuple[str, ...], *, where: str) -> None:
         """Pass where the thresholds are of these joints.
@@ -131,7 +151,7 @@ class ContactThresholds:
             "rate": self.rate, "promised": self.promised, "keeps_rate": self.keeps_rate,
             "seconds": dict(zip(CONDITIONS, self.seconds.tolist(), strict=True)),
             "spread": self.spread, "error": None if self.error is None else self.error.to_dict(),
-            "taken_off": self.taken_off,
+            "taken_off": self.taken_off, "estimate": self.estimate,
         }  # fmt: skip
         return dict(without_infinities(data))
 
@@ -180,7 +200,7 @@ def _from_dict(data: dict[str, Any]) -> ContactThresholds:
         seconds=np.array([data["seconds"][name] for name in CONDITIONS], dtype=np.float64),
         spread=np.nan if data["spread"] is None else float(data["spread"]),
         error=learnt_error(data["error"]) if data.get("error") else None,
-        taken_off=data.get("taken_off", "nothing"),
+        taken_off=data.get("taken_off", "nothing"), estimate=str(data.get("estimate", "")),
     )  # fmt: skip
 
 
@@ -225,7 +245,8 @@ def learn_contact_thresholds(
     sensed = sensed_free(counted.on(sensor), free, air=air)
     floor = followed.least * own.sizes / counted.sizes
     found = thresholds_of(sensed, slow=sensor.model.slow, rate=rate, rules=followed, floor=floor)
-    return replace(found, error=counted, taken_off="nothing" if air is None else "air")
+    taken_off: TakenOff = "nothing" if air is None else "air"
+    return replace(found, error=counted, taken_off=taken_off, estimate=sensor.model.estimate)
 
 
 def thresholds_of(
@@ -303,13 +324,12 @@ class _FreeLog:
 
 
 def _free_log(log: SensedLog, edges: FloatArray, rules: ContactRules) -> _FreeLog:
-    n_v = len(log.joint_names)
-    out = judged_rows(log, (edges, np.full((2 + len(edges), n_v), _OUT_OF_REACH)), rules)
+    kinds, x, _ = free_rows(log, edges, rules)
     told = log.settled & (log.step * np.arange(1, log.n_t + 1) >= rules.quiet)
-    kind, speed = out[told, 2].astype(np.intp), np.abs(log.dq[told])
-    steps = np.stack([np.searchsorted(edges[:-1, j], speed[:, j], side="right") for j in range(n_v)], axis=1)
+    kind, speed = kinds[told], np.abs(log.dq[told])
+    steps = np.stack([np.searchsorted(edges[:-1, j], speed[:, j], side="right") for j in range(speed.shape[1])], axis=1)
     return _FreeLog(
-        x=out[told, 4 : 4 + n_v] * _OUT_OF_REACH, kind=kind, step=log.step,
+        x=x[told], kind=kind, step=log.step,
         row=np.where(kind[:, None] == MOVING, 2 + steps, kind[:, None]),
         block=((log.t[told] - log.t[0]) // rules.block).astype(np.intp),
     )  # fmt: skip
@@ -372,12 +392,3 @@ def _warn(found: ContactThresholds) -> None:
             TauhatWarning,
             stacklevel=3,
         )
-
-
-def judged_rows(log: SensedLog, scaling: tuple[FloatArray, FloatArray], rules: ContactRules) -> FloatArray:
-    """Return what `contact_kernel.judge_along` says of a log, (n_t, 4 + 2 n_v)."""
-    n_v = len(log.joint_names)
-    sensed = np.ascontiguousarray(np.stack([log.tau, np.square(log.tau_std), log.dq], axis=1))
-    out, memory = np.empty((log.n_t, 4 + 2 * n_v)), (np.zeros((ROWS, n_v)), np.zeros(STATES))
-    judge_along(scaling, rules.way(log.step), sensed, log.settled, memory, out)
-    return out

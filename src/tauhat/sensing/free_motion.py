@@ -8,6 +8,7 @@ statistics of few. With z the sensed torque of a log in parts of its standard er
     standard errors are told c s_j times as large; a bar of 1.96 of them then holds 95 % of a log it has not seen
     R = mean of z z', scaled to ones on its diagonal, shrunk to the unit matrix by
     l = sum of the variances of the R_ij between logs / sum of R_ij^2,  i not j
+All means and the quantile are over time, so that a log does not count more for being sampled faster.
 
 Sources: Stone, "Cross-validatory choice and assessment of statistical predictions", 1974 (each log by the others);
 Schaefer, Strimmer, "A shrinkage approach to large-scale covariance matrix estimation", 2005.
@@ -24,7 +25,9 @@ from tauhat.arrays import FloatArray
 from tauhat.errors import SensingError
 from tauhat.recordings.log import Log
 from tauhat.recordings.recording import Recording
+from tauhat.sensing.contact_rules import ContactRules
 from tauhat.sensing.free_logs import sensed_free
+from tauhat.sensing.judged_rows import free_rows
 from tauhat.sensing.sensed_log import SensedLog
 from tauhat.sensing.sensor import ForceSensor
 from tauhat.sensing.zero import AirPass
@@ -37,7 +40,11 @@ _TINY = float(np.finfo(float).tiny)
 
 
 def learnt_from_free_motion(
-    sensor: ForceSensor, logs: Sequence[Recording | Log], *, air: AirPass | None = None
+    sensor: ForceSensor,
+    logs: Sequence[Recording | Log],
+    *,
+    air: AirPass | None = None,
+    standing: ContactRules | None = None,
 ) -> ForceSensor:
     """Return the sensor with the error of each joint, and what errors have in common, that logs without contact show.
 
@@ -52,6 +59,8 @@ def learnt_from_free_motion(
     logs : without any contact, at the speeds of the work, at any rate that the filter allows; several short ones on
         different ways, cold and warm, tell more than a long one
     air : pass that is taken off them, as it is off the work
+    standing : rules whose zero is taken off them, as it is off the work (`judged_log(..., zero="standing")`); then the
+        error is that of what remains (`error_of(learnt, zero="standing")`). None: of torque as sensed
 
     Raises
     ------
@@ -60,11 +69,12 @@ def learnt_from_free_motion(
     """
     unstretched = np.ones(sensor.n_v)
     plain = replace(sensor, model=replace(sensor.model, stretch=unstretched))
-    rms = error_in_free_motion(sensed_free(plain, logs, air=air))
+    rms = error_in_free_motion(_told(plain, logs, air, standing))
     plain = replace(plain, model=replace(plain.model, rms=rms))
-    parts = _parts(sensed_free(plain, logs, air=air))
-    model = replace(plain.model, stretch=_stretch(parts))
-    return replace(plain, model=model, wrench=replace(sensor.solver, correlation=shrunk_correlation(parts)))
+    parts, seconds = _parts(_told(plain, logs, air, standing))
+    correlation = shrunk_correlation(parts, seconds=seconds)
+    model = replace(plain.model, stretch=_stretch(parts, seconds))
+    return replace(plain, model=model, wrench=replace(sensor.solver, correlation=correlation))
 
 
 def error_in_free_motion(free: Sequence[SensedLog]) -> FloatArray:
@@ -84,14 +94,16 @@ def error_in_free_motion(free: Sequence[SensedLog]) -> FloatArray:
     return np.asarray(np.maximum(np.sqrt(squares / seconds), _TINY))
 
 
-def shrunk_correlation(parts: Sequence[FloatArray]) -> FloatArray:
+def shrunk_correlation(parts: Sequence[FloatArray], *, seconds: FloatArray | None = None) -> FloatArray:
     """Return the correlation about zero of columns (n, k), as far as parts agree on it, (k, k).
 
     Parameters
     ----------
     parts : two or more, independent of each other; one that is alike within itself counts as one value
+    seconds : of each part, by which it counts [s]; by its rows where none are given
     """
-    shares = np.array([len(part) for part in parts]) / sum(len(part) for part in parts)
+    weights = np.array([len(part) for part in parts]) if seconds is None else seconds
+    shares = weights / weights.sum()
     products = np.stack([part.T @ part / len(part) for part in parts])
     whole = np.einsum("p,pij->ij", shares, products)
     sizes = np.sqrt(np.maximum(whole.diagonal(), _TINY))
@@ -103,29 +115,47 @@ def shrunk_correlation(parts: Sequence[FloatArray]) -> FloatArray:
     return np.where(beside, (1.0 - shrunk) * found, 1.0)
 
 
-def _parts(free: Sequence[SensedLog]) -> list[FloatArray]:
-    """Return sensed torque in parts of its standard error, (n, n_v), log by log; a few logs are cut."""
+def _told(
+    sensor: ForceSensor, logs: Sequence[Recording | Log], air: AirPass | None, standing: ContactRules | None
+) -> list[SensedLog]:
+    """Return what is told along the logs, less what is taken off."""
+    sensed = sensed_free(sensor, logs, air=air)
+    if standing is None:
+        return sensed
+    slow = sensor.model.slow[None]
+    return [replace(log, tau=log.tau - free_rows(log, slow, standing)[2]) for log in sensed]
+
+
+def _parts(free: Sequence[SensedLog]) -> tuple[list[FloatArray], FloatArray]:
+    """Return sensed torque in parts of its standard error, (n, n_v), log by log, and the seconds of each.
+
+    A few logs are cut.
+    """
     telling = [log for log in free if log.settled.any()]
     least = 1 if len(telling) >= _FEWEST_PARTS else -(-_FEWEST_PARTS // len(telling))
     parts: list[FloatArray] = []
+    seconds: list[float] = []
     for log in telling:
         rows = log.tau[log.settled] / np.maximum(log.tau_std[log.settled], _TINY)
         cuts = 1 if least == 1 else max(least, int(len(rows) * log.step / _PART))
-        parts += [part for part in np.array_split(rows, cuts) if len(part)]
-    return parts
+        found = [part for part in np.array_split(rows, cuts) if len(part)]
+        parts += found
+        seconds += [len(part) * log.step for part in found]
+    return parts, np.array(seconds)
 
 
-def _stretch(parts: Sequence[FloatArray]) -> FloatArray:
+def _stretch(parts: Sequence[FloatArray], seconds: FloatArray) -> FloatArray:
     """Return how many times larger standard errors have to be told, (n_v,)."""
-    counts = np.array([len(part) for part in parts])[:, None]
-    squares = np.stack([np.square(part).sum(axis=0) for part in parts])
-    size = np.sqrt(squares.sum(axis=0) / counts.sum())
-    of_others = np.sqrt((squares.sum(axis=0) - squares) / (counts.sum() - counts))
+    squares = np.stack([second * np.square(part).mean(axis=0) for part, second in zip(parts, seconds, strict=True)])
+    size = np.sqrt(squares.sum(axis=0) / seconds.sum())
+    of_others = np.sqrt(np.maximum(squares.sum(axis=0) - squares, 0.0) / (seconds.sum() - seconds)[:, None])
     seen = size > 0.0
     if not seen.any():
         return np.ones(len(size))
     unseen = [
         np.abs(part[:, seen]) / np.maximum(others[seen], _TINY) for part, others in zip(parts, of_others, strict=True)
     ]
-    wider = float(np.quantile(np.concatenate(unseen), _SHARE)) / _INTERVAL
+    weights = [np.full(values.size, second / len(values)) for values, second in zip(unseen, seconds, strict=True)]
+    values = np.concatenate([part.ravel() for part in unseen])
+    wider = float(np.quantile(values, _SHARE, weights=np.concatenate(weights), method="inverted_cdf")) / _INTERVAL
     return np.where(seen, wider * size, 1.0)

@@ -45,8 +45,6 @@ def hidden_along(sensed: SensedLog, solver: WrenchSolver) -> Hidden:
     if not settled.size:
         return Hidden(0.0, np.zeros(len(COMPONENTS)))
     rows = settled[np.unique(np.linspace(0, settled.size - 1, min(_LOOKED_AT, settled.size)).astype(np.intp))]
-    variance, own = np.square(sensed.tau_std[rows]), np.square(sensed.lag[rows])
-    covariances = solver.along(sensed.q[rows], sensed.tau[rows], variance, own=own).covariance
-    found = [solver.hidden(covariance) for covariance in covariances]
+    found = [solver.hidden(covariance) for covariance in sensed.solved_by(solver, rows).covariance]
     share = float(np.mean([directions.shape[1] > 0 for directions in found]))
     return Hidden(share, np.mean([np.square(directions).sum(axis=1) for directions in found], axis=0))

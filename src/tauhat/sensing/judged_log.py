@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
 
 from tauhat.arrays import FloatArray
 from tauhat.errors import SensingError
@@ -18,10 +17,7 @@ from tauhat.sensing.sensed_log import SensedLog
 from tauhat.sensing.sensor import ForceSensor
 from tauhat.sensing.torque_observer import SensedWarmth
 from tauhat.sensing.wrench import WrenchSolver
-from tauhat.sensing.zero import AirPass, without_air, zeroed
-
-Zero: TypeAlias = Literal["as sensed", "standing"]
-"""Whether what is told holds what friction held when the arm came to rest, or less it."""
+from tauhat.sensing.zero import AirPass, Zero, without_air, zeroed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,9 +63,10 @@ def judged_log(
     Raises
     ------
     SensingError
-        when log, thresholds or pass do not suit the sensor, or the thresholds are behind a pass and there is none.
+        when log, thresholds or pass do not suit the sensor, or the thresholds are behind a pass, or their error behind
+        a standing zero, that is not taken off here.
     """
-    check_taken_off(thresholds, air)
+    check_taken_off(thresholds, air, zero=zero)
     sensed = sensor.along(log)
     if air is not None:
         sensed = without_air(sensed, air, solver=sensor.solver)
@@ -101,8 +98,8 @@ def told_from_payloads(contacts: Contacts, sensed: SensedLog, solver: WrenchSolv
     return replace(contacts, events=tuple(events))
 
 
-def check_taken_off(thresholds: ContactThresholds, air: AirPass | None) -> None:
-    """Pass unless the thresholds are of what remains behind a pass in air, and there is no pass.
+def check_taken_off(thresholds: ContactThresholds, air: AirPass | None, *, zero: Zero = "as sensed") -> None:
+    """Pass unless thresholds, or the error they hold, are of what remains behind something that stays on here.
 
     Raises
     ------
@@ -113,4 +110,9 @@ def check_taken_off(thresholds: ContactThresholds, air: AirPass | None) -> None:
         raise SensingError(
             "thresholds of what remains behind a pass in air", where="contact",
             remedy="take the pass off here as well (--zero air:LOG), or learn thresholds without it",
+        )  # fmt: skip
+    if thresholds.error is not None and thresholds.error.zero == "standing" and zero != "standing":
+        raise SensingError(
+            "error bars of what remains behind a standing zero", where="contact",
+            remedy="take the zero off here as well (sense --zero standing), or learn without it (--free)",
         )  # fmt: skip

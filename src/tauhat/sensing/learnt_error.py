@@ -11,6 +11,7 @@ import numpy as np
 from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import SensingError
 from tauhat.sensing.sensor import ForceSensor
+from tauhat.sensing.zero import Zero
 
 _SAME = 0.01  # share to which two settings are one
 
@@ -62,12 +63,14 @@ class LearntError:
     stretch : (n_v,) what standard errors are multiplied with where they are told
     correlation : (n_v, n_v) of the joints' errors, as the wrench is solved with it
     settings : of the sensor that showed it; None: nobody knows
+    zero : what was taken off where it was shown; standing: the error of torque as sensed is larger
     """
 
     rms: FloatArray
     stretch: FloatArray
     correlation: FloatArray
     settings: SensorSettings | None = None
+    zero: Zero = "as sensed"
 
     def __post_init__(self) -> None:
         n_v = np.size(self.rms)
@@ -75,6 +78,8 @@ class LearntError:
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape, where="learnt error"))
         if not ((self.rms > 0.0).all() and (self.stretch > 0.0).all()):
             raise SensingError("learnt error", expected="above zero", got=self.rms.tolist())
+        if self.zero not in {"as sensed", "standing"}:
+            raise SensingError("zero of a learnt error", expected="as sensed or standing", got=str(self.zero)[:60])
 
     @property
     def sizes(self) -> FloatArray:
@@ -103,7 +108,7 @@ class LearntError:
         """Return plain data."""
         return {
             "rms": self.rms.tolist(), "stretch": self.stretch.tolist(), "correlation": self.correlation.tolist(),
-            "settings": None if self.settings is None else self.settings._asdict(),
+            "settings": None if self.settings is None else self.settings._asdict(), "zero": self.zero,
         }  # fmt: skip
 
 
@@ -113,9 +118,14 @@ def learnt_error(data: Mapping[str, Any]) -> LearntError:
     return LearntError(**{**data, "settings": SensorSettings(**settings) if settings else None})
 
 
-def error_of(sensor: ForceSensor) -> LearntError:
-    """Return the error that a sensor has now."""
+def error_of(sensor: ForceSensor, *, zero: Zero = "as sensed") -> LearntError:
+    """Return the error that a sensor has now.
+
+    Parameters
+    ----------
+    zero : what was taken off where it was learnt
+    """
     return LearntError(
         rms=sensor.model.rms, stretch=sensor.model.stretch, correlation=np.array(sensor.solver.correlation),
-        settings=settings_of(sensor),
+        settings=settings_of(sensor), zero=zero,
     )  # fmt: skip

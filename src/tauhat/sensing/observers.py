@@ -61,6 +61,24 @@ class Observer(ABC):
         """Return what `thermal_kernel` reads where the observer follows the warmth of the joints; else empty."""
         return read_only(np.zeros((0, 5))), read_only(np.zeros((0, 2))), read_only(np.zeros(0)), read_only(np.zeros(0))
 
+    def check_follows_warmth(self) -> None:
+        """Pass where the observer follows the warmth of the joints.
+
+        Raises
+        ------
+        SensingError
+            when it follows none.
+        """
+        if self.kind != kernel.THERMAL:
+            raise SensingError("the observer follows no warmth", expected="thermal", got=self.key)
+
+    def no_body(self) -> SensingError:
+        """Return the refusal of a mass matrix that the observer needs and that is of no body."""
+        return SensingError(
+            "the mass matrix of the estimate is that of no body", where=f"observer {self.key}",
+            remedy="take another observer, or identify with --physical",
+        )  # fmt: skip
+
     @abstractmethod
     def _own(self, model: SensedModel, step: float) -> FloatArray:
         """Return the observer's numbers, (n,) for all joints or (n_v, n)."""
@@ -244,8 +262,8 @@ class ThermalObserver(FrictionObserver):
 class RefreshObserver(FrictionObserver):
     """Friction that changes slowly for reasons nobody knows: the state is the part by which it is larger than fitted.
 
-    For estimates without a thermal term. Dry and viscous friction grow and shrink together; the part fades to `start`
-    with the time constant `time`, and wanders by `wander` meanwhile.
+    For estimates without a thermal term. Dry and viscous friction grow and shrink together; the part fades to zero with
+    the time constant `time`, over a gap to `start`, and wanders by `wander` meanwhile.
 
     time : over which friction may have changed [s]
     """

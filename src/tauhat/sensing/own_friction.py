@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from tauhat.arrays import FloatArray, read_only
-from tauhat.dynamics.base import random_motion
 from tauhat.dynamics.passive_kernel import passive_kernel
 from tauhat.dynamics.rigid_body import gravity_torque
 from tauhat.sensing.sensed_model import STANDING, SensedModel
 
 _LOOKED_AT = (0.2, 0.8)  # of the top speed: where friction is split into a dry and a viscous part
-_STATES, _SEED = 100, 20240229
 
 
 def own_friction(model: SensedModel) -> FloatArray:
@@ -21,8 +19,7 @@ def own_friction(model: SensedModel) -> FloatArray:
     load of load-dependent friction is the mean weight at random positions.
     """
     tops = model.slow / STANDING
-    q = random_motion(model.robot, _STATES, np.random.default_rng(_SEED)).q.T
-    load = np.abs(gravity_torque(model.robot, q, inertia=model.inertia)).mean(axis=0)
+    load = np.abs(gravity_torque(model.robot, model.random_positions, inertia=model.inertia)).mean(axis=0)
     low, high = (_resistance(model, part * tops, load) for part in _LOOKED_AT)
     viscous = np.maximum((high - low) / ((_LOOKED_AT[1] - _LOOKED_AT[0]) * tops), 0.0)
     dry = np.maximum(low - _LOOKED_AT[0] * tops * viscous, 0.0)

@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray, IntArray, read_only
-from tauhat.sensing.wrench import COMPONENTS
+from tauhat.sensing.wrench import COMPONENTS, SensedWrench, WrenchSolver
 
 FRAME_KEY, AXES_KEY = "tauhat.frame", "tauhat.axes"
+_ARRAYS = (
+    "t", "rows", "q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled", "lag", "force_shared",
+)  # fmt: skip
 
 
 class SampleCounts(NamedTuple):
@@ -68,6 +71,7 @@ class SensedLog:
     settled : (n_t,) whether the last start is forgotten
     counts : of samples
     lag : (n_t, n_v) what the torque changed by within the observer's delay; `wrench_std` holds it [Nm or N]
+    force_shared : (n_t, 3) covariances of fx and fy, fx and fz, fy and fz [N^2]
     believed : of how many samples the time stamps were believed; of the others they count periods
     """
 
@@ -89,10 +93,11 @@ class SensedLog:
     settled: NDArray[np.bool_]
     counts: SampleCounts
     lag: FloatArray
+    force_shared: FloatArray
     believed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("t", "rows", "q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled", "lag"):
+        for name in _ARRAYS:
             read_only(getattr(self, name))
 
     @property
@@ -104,6 +109,25 @@ class SensedLog:
     def solved(self) -> tuple[bool, ...]:
         """Which of the six components of the wrench were asked for."""
         return tuple(bool((column > 0.0).any()) for column in self.wrench_std.T)
+
+    def force_std(self, along: FloatArray, rows: slice) -> FloatArray:
+        """Return the standard error of the force along directions, `sqrt(u'C u)` with u = along / |along|, (n,) [N].
+
+        Parameters
+        ----------
+        along : (n, 3) of any length; those of none have no error
+        rows : the n samples to which they belong
+        """
+        sizes = np.linalg.norm(along, axis=1)
+        x, y, z = (along / np.maximum(sizes, np.finfo(float).tiny)[:, None]).T
+        alone = np.square(np.stack([x, y, z], axis=1) * self.wrench_std[rows, :3]).sum(axis=1)
+        together = (np.stack([x * y, x * z, y * z], axis=1) * self.force_shared[rows]).sum(axis=1)
+        return np.asarray(np.sqrt(np.maximum(alone + 2.0 * together, 0.0)))
+
+    def solved_by(self, solver: WrenchSolver, rows: slice | IntArray) -> SensedWrench:
+        """Return the wrench at some of the samples by a solver, with covariances (n, 6, 6)."""
+        variance, own = np.square(self.tau_std[rows]), np.square(self.lag[rows])
+        return solver.along(self.q[rows], self.tau[rows], variance, own=own)
 
     def columns(self) -> dict[str, FloatArray]:
         """Return the columns of a file: t, tau_ext_1 .., tau_ext_std_1 .., fx .. mz, fx_std .. mz_std."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -39,6 +40,7 @@ class SensedModel:
     heat : how friction changes with the warmth of the joints; None: it does not
     stretch : (n_v,) what standard errors of external torque are multiplied with where they are told, one by default;
         observers themselves go by `rms`
+    estimate : fingerprint of the estimate, whatever tool is carried; empty: nobody knows
     """
 
     robot: Robot
@@ -50,6 +52,7 @@ class SensedModel:
     slow: FloatArray
     heat: SensedHeat | None = None
     stretch: FloatArray = field(default_factory=lambda: np.ones(0))
+    estimate: str = ""
 
     def __post_init__(self) -> None:
         n_v = self.robot.n_v
@@ -79,9 +82,14 @@ class SensedModel:
         return np.where(np.isfinite(stated) & (stated > 0.0), stated, _STRENGTH * self.rms)
 
     @property
+    def random_positions(self) -> FloatArray:
+        """Positions that stand for all, always the same, (n, n_v) [rad or m]."""
+        return np.asarray(random_motion(self.robot, _STATES, np.random.default_rng(_SEED)).q.T)
+
+    @property
     def typical_inertia(self) -> FloatArray:
         """Mean diagonal of the mass matrix over random positions, rotors included, (n_v,) [kg m^2 or kg]."""
-        q = random_motion(self.robot, _STATES, np.random.default_rng(_SEED)).q.T
+        q = self.random_positions
         masses = rotor_mass_matrix(self.robot, q, masses=Masses(self.inertia, self.rotor))
         return np.asarray(masses.diagonal(axis1=1, axis2=2).mean(axis=0))
 
@@ -137,4 +145,11 @@ def sensed_model(estimate: Estimate) -> SensedModel:
         rms=np.maximum(estimate.joint_rms, np.finfo(float).tiny),
         slow=STANDING * np.maximum(tops, np.finfo(float).tiny),
         heat=parts.heat,
+        estimate=_fingerprint(estimate),
     )
+
+
+def _fingerprint(estimate: Estimate) -> str:
+    """Return a hash of model and values: the same before and after a file."""
+    values = np.asarray(estimate.values, dtype="<f8").tobytes()
+    return hashlib.sha256(estimate.model.fingerprint.encode() + values).hexdigest()[:16]

@@ -16,9 +16,9 @@ from tauhat.recordings.recording import Recording
 from tauhat.robots.fitting import check_joint_order
 from tauhat.sensing import sensor_kernel as kernel
 from tauhat.sensing import stamp_kernel as stamp
-from tauhat.sensing.causal_filter import CausalFilter
+from tauhat.sensing.causal_filter import HIGHEST, CausalFilter
 from tauhat.sensing.frozen import frozen_along
-from tauhat.sensing.observer_kernel import DISTURBANCE, THERMAL
+from tauhat.sensing.observer_kernel import DISTURBANCE
 from tauhat.sensing.observers import MomentumObserver, Observer
 from tauhat.sensing.sensed_log import SampleCounts, SensedLog
 from tauhat.sensing.sensed_model import SensedModel, sensed_model
@@ -32,11 +32,11 @@ Stamps: TypeAlias = Literal["auto", "exact", "jittered"]
 STAMPS: Mapping[str, int] = {"auto": stamp.AUTO, "exact": stamp.EXACT, "jittered": stamp.JITTERED}
 CUTOFF = 10.0  # [Hz]
 OFF_RATE = 0.05  # a clock further off than this is another one
-_OF_RATE = 0.45  # the highest cut-off in parts of the rate
 _BRIDGED_STEPS, _BRIDGED = 5.0, 0.02  # lost samples are put back over so many steps, or so long [s]
 _CHUNK = 2**16  # [samples] between which Python may be interrupted
 _NO_LAG = read_only(np.zeros(1))
 _HALF = 0.5  # period that a stamp may be late
+_MOST, _SINGLE = 0.75, 0.05  # of the steps that have to be whole multiples, and single ones, where samples are lost
 _ORDINARY = 0.25  # of the median: two steps further off hold a lost sample, or one that is late
 
 
@@ -98,7 +98,7 @@ class ForceSensor:
         solver = self.solver
         if solver.robot.fingerprint != self.model.robot.fingerprint:
             raise SensingError("the wrench is of another robot", expected=self.model.robot.name, got=solver.robot.name)
-        cutoff = min(CUTOFF, _OF_RATE * self.rate) if self.cutoff is None else self.cutoff
+        cutoff = min(CUTOFF, HIGHEST / self.step) if self.cutoff is None else self.cutoff
         object.__setattr__(self, "wrench", solver)
         object.__setattr__(self, "cutoff", cutoff)
         observer = TorqueObserver(model=self.model, step=self.step, observer=self.observer, cutoff=cutoff)
@@ -181,7 +181,7 @@ class ForceSensor:
         state, out = memory.copy(), (np.empty((kernel.OUT, n_v)), np.empty((7, 6)))
         code = kernel.take_one(self._machine, stamped, state, out)
         if code == stamp.NO_BODY:
-            raise self._no_body()
+            raise self.observer.no_body()
         if code > stamp.RESTARTED:
             return state, None, code
         tau, variance, q, dq, raw, lag = out[0]
@@ -216,8 +216,7 @@ class ForceSensor:
         SensingError
             as `along`, and when the observer follows no warmth.
         """
-        if self.observer.kind != THERMAL:
-            raise SensingError("the observer follows no warmth", expected="thermal", got=self.observer.key)
+        self.observer.check_follows_warmth()
         codes, results = np.empty(log.n_t, dtype=np.intp), _results(log.n_t, self.n_v)
         starts = range(0, log.n_t, max(1, min(_CHUNK, log.n_t // points)))
         told = [self.warmth(state) for state, _ in self._windows(log, starts, results, codes)]
@@ -231,7 +230,7 @@ class ForceSensor:
     ) -> Iterator[tuple[FloatArray, int]]:
         """Fill results and codes window by window; yield the memory behind each, and how many samples were taken."""
         torque = _torque(self.model, log)
-        self._check_rate(log)
+        self.check_rate(log.t, where=log.name)
         state, filled = self.start().copy(), 0
         for first in starts:
             window = slice(first, first + starts.step)
@@ -239,7 +238,7 @@ class ForceSensor:
             rest = tuple(result[filled:] for result in results)
             count = kernel.take_all(self._machine, samples, state, rest, codes[window])
             if count < 0:
-                raise self._no_body()
+                raise self.observer.no_body()
             filled += count
             yield state, filled
 
@@ -249,7 +248,7 @@ class ForceSensor:
         if not rows.size:
             raise SensingError("no sample of the log can be used", where=log.name, got=f"{log.n_t} samples")
         frozen = 0 if log.tau is None else frozen_along(log.q[rows], log.tau[rows])
-        names = ("q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled", "lag")
+        names = ("q", "dq", "tau", "tau_std", "raw", "wrench", "wrench_std", "settled", "lag", "force_shared")
         joints = self.model.robot.joints
         return SensedLog(
             name=log.name, joint_names=tuple(joint.name for joint in joints),
@@ -259,23 +258,25 @@ class ForceSensor:
             **dict(zip(names, results[:-1], strict=True)),
         )  # fmt: skip
 
-    def _check_rate(self, log: Recording | Log) -> None:
-        step = usual_step(log.t)
-        if not abs(step * self.rate - 1.0) <= OFF_RATE:
-            raise self.other_rate(step, where=log.name)
+    def check_rate(self, t: FloatArray, *, where: str) -> None:
+        """Pass time stamps of the sensor's rate, within 5 %, also where many samples between are lost.
 
-    def other_rate(self, step: float, *, where: str) -> SensingError:
-        """Return the refusal of samples that are `step` seconds apart."""
-        return SensingError(
+        Parameters
+        ----------
+        t : time stamps [s]
+
+        Raises
+        ------
+        SensingError
+            when samples come at another rate.
+        """
+        usual = usual_step(t)
+        if any(abs(step * self.rate - 1.0) <= OFF_RATE for step in (usual, step_between_gaps(t, self.step))):
+            return
+        raise SensingError(
             "samples of another rate", where=where, expected=f"{self.rate:.6g} Hz within {100 * OFF_RATE:.0f} %",
-            got=f"{1.0 / step:.6g} Hz" if step > 0 else "time that stands still",
+            got=f"{1.0 / usual:.6g} Hz" if usual > 0 else "time that stands still",
             remedy="make the sensor for the rate of the samples (--rate)",
-        )  # fmt: skip
-
-    def _no_body(self) -> SensingError:
-        return SensingError(
-            "the mass matrix of the estimate is that of no body", where=f"observer {self.observer.key}",
-            remedy="take another observer, or identify with --physical",
         )  # fmt: skip
 
 
@@ -325,6 +326,22 @@ def usual_step(t: FloatArray) -> float:
     return float(steps[np.abs(steps - middle) <= _ORDINARY * middle].mean())
 
 
+def step_between_gaps(t: FloatArray, near: float) -> float:
+    """Return the step near one that is expected, of which the times between samples are whole multiples [s].
+
+    So samples of a busy machine have one, though half of them may be lost; those of another rate have none, also where
+    it is the expected one over a whole number: then hardly a step is single. Zero where there is none.
+    """
+    steps = np.diff(t[np.isfinite(t)])
+    steps = steps[steps > 0.0]
+    periods = np.maximum(1.0, np.round(steps / near))
+    whole = np.abs(steps - periods * near) <= _ORDINARY * near  # one of two, where it is by chance
+    single = np.count_nonzero(whole & (periods == 1.0))
+    if np.count_nonzero(whole) < _MOST * steps.size or single <= _SINGLE * steps.size:
+        return 0.0
+    return float(steps[whole].sum() / periods[whole].sum())
+
+
 def counted(codes: IntArray) -> SampleCounts:
     """Return how many samples were taken and why others were not, by their codes in order."""
     counts = np.bincount(codes, minlength=stamp.NO_BODY)
@@ -356,4 +373,6 @@ def _torque(model: SensedModel, log: Recording | Log) -> FloatArray:
 
 def _results(n_t: int, n_v: int) -> tuple[Any, ...]:
     flags = (np.empty(n_t, dtype=np.bool_) for _ in range(2))
-    return (*(np.empty((n_t, n)) for n in (*[n_v] * 5, 6, 6)), next(flags), np.empty((n_t, n_v)), next(flags))
+    columns = (np.empty((n_t, n)) for n in (*[n_v] * 5, 6, 6, n_v, 3))
+    *before, lag, shared = columns
+    return (*before, next(flags), lag, shared, next(flags))

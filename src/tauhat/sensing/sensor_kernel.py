@@ -250,10 +250,11 @@ def take_all(machine, samples, state, results, codes):  # type: ignore[no-untype
 
     `results` are position, velocity, external torque and its standard error, raw external torque (n_v wide each),
     wrench and its standard errors (6), whether the start is forgotten, what the torque changed by within the lag (n_v),
-    and whether stamps were believed. Return the number of rows filled, or -1 where the mass matrix is that of no body.
+    covariances fx fy, fx fz, fy fz of the force (3), and whether stamps were believed. Return the number of rows
+    filled, or -1 where the mass matrix is that of no body.
     """
     n_v = samples[1].shape[1]
-    q, dq, tau, tau_std, raw, wrench, wrench_std, settled, lag, believed = results
+    q, dq, tau, tau_std, raw, wrench, wrench_std, settled, lag, shared, believed = results
     memory = split(state, n_v, machine[0][4].size)
     work, out = scratch(n_v, machine[2][3].size), (np.empty((OUT, n_v)), np.empty((7, 6)))
     stamped, filled = np.empty(1 + 2 * n_v), 0
@@ -272,6 +273,7 @@ def take_all(machine, samples, state, results, codes):  # type: ignore[no-untype
             lag[filled, j] = out[0][5, j]
         for r in range(6):
             wrench[filled, r], wrench_std[filled, r] = out[1][0, r], np.sqrt(out[1][1 + r, r])
+        shared[filled, 0], shared[filled, 1], shared[filled, 2] = out[1][1, 1], out[1][1, 2], out[1][2, 2]
         settled[filled] = behind_start(machine[3][0][1] * memory[0][AGE]) < SETTLED
         believed[filled] = memory[0][BELIEVED] > 0.0
         filled += 1

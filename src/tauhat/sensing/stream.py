@@ -7,7 +7,8 @@ What becomes of a sample:
     later than that                               taken, and everything starts again with wide error bars
     the same to the bit as those before it        taken; counted as `frozen` from ten in a row on
 Stamps are believed or counted as whole periods, as positions tell (see `stamp_kernel`). The rate is judged over 100
-samples at a time: the usual step has to be the sensor's within 5 %.
+samples at a time: the usual step has to be the sensor's within 5 %, or, where many samples are lost, the one of which
+the steps are whole multiples.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ from tauhat.arrays import FloatArray
 from tauhat.sensing import stamp_kernel as stamp
 from tauhat.sensing.frozen import IN_A_ROW, newly_frozen
 from tauhat.sensing.sensed_log import SampleCounts
-from tauhat.sensing.sensor import OFF_RATE, ForceSensor, Sensed, usual_step
+from tauhat.sensing.sensor import ForceSensor, Sensed
 
-_JUDGED = 100  # samples over which the rate is measured
+JUDGED = 100  # samples over which the rate is measured
 
 
 class StreamMemory(NamedTuple):
@@ -49,10 +50,12 @@ class SensorStream:
 
     sensor : model, observer, rate
     name : what messages call the stream
+    judged : samples over which the rate is measured; None where it is known to be the sensor's
     """
 
     sensor: ForceSensor
     name: str = "stream"
+    judged: int | None = JUDGED
 
     def start(self) -> StreamMemory:
         """Return the memory before the first sample."""
@@ -77,7 +80,7 @@ class SensorStream:
         counts = _with(memory.counts, code)
         if sensed is None:
             return memory._replace(sensor=after, counts=counts), None
-        times = self._judged((t,) if code == stamp.RESTARTED else (*memory.times, t))
+        times = self._judged((*memory.times, t))
         last = q.tobytes() + tau.tobytes()
         alike = memory.alike + 1 if last == memory.last else 0
         if alike >= IN_A_ROW:
@@ -86,11 +89,11 @@ class SensorStream:
 
     def _judged(self, times: tuple[float, ...]) -> tuple[float, ...]:
         """Return the times that are still to be judged, after refusing those of another rate."""
-        if len(times) <= _JUDGED:
+        if self.judged is None:
+            return ()
+        if len(times) <= self.judged:
             return times
-        step = usual_step(np.array(times))
-        if not abs(step * self.sensor.rate - 1.0) <= OFF_RATE:
-            raise self.sensor.other_rate(step, where=f"{self.name}, {times[-1]:.6g} s")
+        self.sensor.check_rate(np.array(times), where=f"{self.name}, {times[-1]:.6g} s")
         return times[-1:]
 
 

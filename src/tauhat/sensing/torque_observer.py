@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tauhat.arrays import FloatArray, frozen, read_only
 from tauhat.errors import SensingError
 from tauhat.sensing.causal_filter import CausalFilter
-from tauhat.sensing.observer_kernel import ROWS, SCRATCH, THERMAL, observe
+from tauhat.sensing.observer_kernel import ROWS, SCRATCH, observe
 from tauhat.sensing.observers import HeatPlan, MomentumObserver, Observer
 from tauhat.sensing.sensed_model import SensedModel
 from tauhat.sensing.thermal_kernel import SAID, VARIANCE, WARMTH
@@ -134,7 +134,7 @@ class TorqueObserver:
         after.rows[SAID] = _SAID[free]
         sample, out = np.stack([q, tau]), np.empty((_OUT, self.n_v))
         if not observe(self._body, self._plan, sample, (*after, *_scratch(self.n_v)), out):
-            raise self._no_body()
+            raise self.observer.no_body()
         return after, SensedTorque(*out)
 
     def warmth(self, memory: ObserverMemory) -> SensedWarmth:
@@ -165,8 +165,7 @@ class TorqueObserver:
         SensingError
             as `advance`, and when the observer follows no warmth.
         """
-        if self.observer.kind != THERMAL:
-            raise SensingError("the observer follows no warmth", expected="thermal", got=self.observer.key)
+        self.observer.check_follows_warmth()
         _, warm = self._along(q, tau, free)
         return SensedWarmth(np.ascontiguousarray(warm[:, 0]), np.ascontiguousarray(warm[:, 1]))
 
@@ -177,14 +176,8 @@ class TorqueObserver:
         out, warm = np.empty((len(position), _OUT, self.n_v)), np.empty((len(position), 2, self.n_v))
         memory, samples = self.start(), (position, torque, _said(free, len(position)))
         if not _observe_along(self._body, self._plan, samples, (*memory, *_scratch(self.n_v)), (out, warm)):
-            raise self._no_body()
+            raise self.observer.no_body()
         return out, warm
-
-    def _no_body(self) -> SensingError:
-        return SensingError(
-            "the mass matrix of the estimate is that of no body", where=f"observer {self.observer.key}",
-            remedy="take another observer, or identify with --physical",
-        )  # fmt: skip
 
 
 def _scratch(n_v: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -163,15 +163,18 @@ class WrenchSolver:
         return SensedWrench(wrench, covariance)
 
     def hidden(self, covariance: FloatArray) -> FloatArray:
-        """Return the directions that the joints do not tell, unit wrenches in parts of `largest`, (6, n).
+        """Return the directions that the joints do not tell, orthonormal in parts of `largest`, (6, n).
+
+        They have half of their conceivable variance or more left, in the scaling of the solve (`sizes`).
 
         Parameters
         ----------
         covariance : (6, 6) of one sensed wrench
         """
-        sizes = np.repeat(self.largest, 3)
-        shares, axes = np.linalg.eigh(covariance / np.outer(sizes, sizes))
-        return np.asarray(axes[:, shares > _HIDDEN])
+        own = np.linalg.pinv(self.directions)
+        shares, axes = np.linalg.eigh(own @ covariance @ own.T / np.outer(self._spread, self._spread))
+        hidden = self.directions @ (self._spread[:, None] * axes[:, shares > _HIDDEN])
+        return np.asarray(np.linalg.qr(hidden / np.repeat(self.largest, 3)[:, None])[0])
 
 
 def _spread(sizes: FloatArray, usual: FloatArray) -> FloatArray:

@@ -8,6 +8,7 @@ same motion in air tells it: `AirPass`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from tauhat.arrays import FloatArray, frozen
 from tauhat.errors import SensingError
 from tauhat.sensing.sensed_log import SensedLog
 from tauhat.sensing.wrench import WrenchSolver
+
+Zero: TypeAlias = Literal["as sensed", "standing"]
+"""Whether what is told holds what friction held when the arm came to rest, or less it."""
 
 _FEWEST = 2
 _SAME_PLACE = 0.05  # [rad or m] to which two passes of a motion agree
@@ -150,14 +154,14 @@ def zeroed(sensed: SensedLog, zero: FloatArray, *, solver: WrenchSolver) -> Sens
     ArrayError
         when the zero has another shape.
     """
-    tau = sensed.tau - frozen("zero", zero, sensed.tau.shape, where=sensed.name)
-    wrench, errors = np.empty((sensed.n_t, 6)), np.empty((sensed.n_t, 6))
+    less = replace(sensed, tau=sensed.tau - frozen("zero", zero, sensed.tau.shape, where=sensed.name))
+    wrench, errors, shared = (np.empty((sensed.n_t, n)) for n in (6, 6, 3))
     for first in range(0, sensed.n_t, _CHUNK):  # covariances take 36 numbers a sample
         window = slice(first, first + _CHUNK)
-        variance, own = np.square(sensed.tau_std[window]), np.square(sensed.lag[window])
-        found = solver.along(sensed.q[window], tau[window], variance, own=own)
+        found = less.solved_by(solver, window)
         wrench[window], errors[window] = found.wrench, found.standard_errors
-    return replace(sensed, tau=tau, wrench=wrench, wrench_std=errors, frame=str(solver.frame))
+        shared[window] = found.covariance[:, [0, 0, 1], [1, 2, 2]]
+    return replace(less, wrench=wrench, wrench_std=errors, force_shared=shared, frame=str(solver.frame))
 
 
 def _shift(since: FloatArray, sensed: SensedLog, air: AirPass) -> float:
