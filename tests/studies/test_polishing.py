@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from tauhat.control.force import PolishTask
-from tauhat.errors import ModelError
+from tauhat.errors import ModelError, SimulationError
 from tauhat.excitation.fourier import random_fourier
 from tauhat.excitation.repeated import Repeated
 from tauhat.robots import forward_kinematics, load_robot
 from tauhat.sensing import force_sensor
 from tauhat.simulation.contact import TIP, start_cell
-from tauhat.studies.polishing import PolishingStudy, chapters, shift
+from tauhat.studies.polishing import PolishingStudy, chapters, polishing_study, shift
 from tauhat.studies.polishing.arm import Arm, ArmSettings, Scene
 from tauhat.studies.polishing.calibration import STEADY, CalibrationSettings
 from tauhat.studies.polishing.findings import Findings, finished, spread
@@ -25,6 +25,7 @@ from tauhat.studies.polishing.shift import ShiftSettings
 from tauhat.studies.polishing.trials import Outcome, judged
 from tauhat.studies.polishing.truth import AMBIENT, PlantSettings
 from tauhat.studies.polishing.work import SHAPES, WorkSettings, postures_of
+from tauhat.workers import LocalWorkers
 
 SHORT = WorkSettings(task=PolishTask(half=0.02, force=30.0, settle=0.5), way_in=0.1)
 SMALL = ArmSettings(calibration=CalibrationSettings(seconds=40.0), work=SHORT)
@@ -146,7 +147,47 @@ def test_the_chapters_tell_the_figures_of_the_jobs():
     assert row["cold: RMS [%]"] == pytest.approx(11.0)
     assert row["warm: done"] == "4 of 4"
     assert row["inside [%]"] == pytest.approx(90.0)
-    assert chapters.others_chapter(found).tables[0].rows
+    flat = replace(_blank(), phase="done", bias=0.0)
+    more = [
+        replace(flat, warmth=warmth, sensor=name, rms=rms)
+        for warmth in ("cold", "warm")
+        for name, rms in (
+            ("kalman", 0.047),
+            ("with warmth, three forces", 0.028),
+            ("with warmth, six components", 0.062),
+        )
+    ]
+    others = chapters.others_chapter(replace(found, outcomes=(*outcomes, *more)))
+    assert [row[0] for row in others.tables[0].rows][1:4] == [one.sensor for one in more[:3]]
+    assert "Cold, observers by name lie between 4 and 4.7 %" in others.text[0]
+    assert "for one direction 3.1 %, for three forces 2.8 %, for six components 6.2 %" in others.text[1]
+
+
+def test_a_shift_that_fails_takes_no_other_chapter_with_it(monkeypatch):
+    done = replace(_blank(), sensor=LOAD_CELL, rms=0.02, bias=0.0, phase="done")
+
+    def tried(trial):
+        if trial.seed == 1:
+            raise SimulationError("the arm went unstable")
+        return tuple(replace(done, shape=shape, warmth=warmth) for shape in SHAPES for warmth in ("cold", "warm")), ()
+
+    def shift_of(trial):
+        raise SimulationError("the tip went unstable")
+
+    monkeypatch.setattr(polishing_study, "whole_room", lambda *_, **__: None)
+    for function in (tried, shift_of):
+        monkeypatch.setattr(polishing_study, function.__name__, function)
+    study = PolishingStudy(seeds=2, first_seed=0, difficulties=("easy",), local=0, shifts=1, accidents=0)
+    result = study.run(LocalWorkers(count=1))
+    assert result.chapters[1].tables[0].rows[0][:2] == (LOAD_CELL, 2.0)
+    assert result.chapters[-1].title == "A shift"
+    assert "no jobs of a shift" in result.chapters[-1].text[0]
+    arm_failed, shift_failed, chapter_failed = result.failures
+    assert arm_failed == "2 of 2 arms failed: the arm went unstable"
+    assert shift_failed == "1 of 1 shifts failed: the tip went unstable"
+    assert chapter_failed in result.summary
+    with pytest.raises(ModelError, match=r"no arm came through.*arm went unstable"):
+        replace(study, seeds=1, first_seed=1).run(LocalWorkers(count=1))
 
 
 def test_a_break_comes_in_the_middle_of_the_shift():
@@ -155,8 +196,9 @@ def test_a_break_comes_in_the_middle_of_the_shift():
     assert [hour for hour in usual.times if usual.rests(hour)] == [2.0, 2.25]
 
 
-def test_joints_warm_up_over_a_shift_and_cool_in_the_break(arm, monkeypatch):
+def test_joints_warm_up_over_a_shift_and_cool_in_the_break(arm, models, monkeypatch):
     monkeypatch.setattr(shift, "SHOWN", (LOAD_CELL,))
+    monkeypatch.setattr(Arm, "calibrated", lambda _: models)  # a load cell needs none
     hours = ShiftSettings(hours=0.75, every=900.0, rest=(0.25, 0.5))
     done = shift.shift_of(shift.ShiftTrial(settings=SMALL, shift=hours, seed=0, motion=arm.motion))
     assert [worked.hour for worked in done] == [0.0, 0.25, 0.5, 0.75]

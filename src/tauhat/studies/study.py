@@ -97,6 +97,7 @@ class StudyResult:
     title : of its page
     summary : the answer in a few sentences, with its numbers
     settings : what it was run with
+    failures : what could not be done, a line each; the result is that of the rest
     """
 
     name: str
@@ -104,6 +105,7 @@ class StudyResult:
     summary: str
     chapters: tuple[Chapter, ...]
     settings: dict[str, Any]
+    failures: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; numbers that are not finite become None."""
@@ -127,3 +129,15 @@ class Study(ABC):
     @abstractmethod
     def run(self, workers: Workers, *, tell: Callable[[str], None] = lambda _: None) -> StudyResult:
         """Return what the study finds, its independent parts done by the workers; `tell` hears how far it is."""
+
+
+def require_arms(study: str, seeds: int) -> None:
+    """Refuse a study of no arms.
+
+    Raises
+    ------
+    ModelError
+        names the study.
+    """
+    if seeds < 1:
+        raise ModelError("arms of the study", where=study, expected="1 seed or more", got=seeds)

@@ -13,12 +13,12 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, read_only
 from tauhat.errors import SimulationError
+from tauhat.simulation.sensors.clock import HALF_WIDTH, refuse_overtaking
 from tauhat.simulation.sensors.joint_values import per_joint
 from tauhat.simulation.sensors.sensor_errors import SensorErrors
 
 LINK, MOTOR, TORQUE = range(3)  # rows of what is remembered of a control period
 _HOUR = 3600.0  # [s]
-_HALF_WIDTH = np.sqrt(3.0)  # of a uniform density of unit deviation
 _BLOCK = 256  # samples whose random numbers are drawn together
 
 
@@ -110,7 +110,7 @@ class SensorStream:
         self._drift = per_joint("torque_drift", errors.torque_drift, n_v)
         self._walk = per_joint("torque_walk", errors.torque_walk, n_v)
         self._ripples = _ripples_of(self._errors, n_v)
-        self._latest = _HALF_WIDTH * errors.sampling_jitter
+        self._latest = HALF_WIDTH * errors.sampling_jitter
         self._side, self._behind = sampling.side, sampling.behind
         longest = 2.0 * self._latest + max(errors.torque_delay, 0.0)
         self._recall = Recall(sampling.control_period, longest, first)
@@ -133,7 +133,7 @@ class SensorStream:
         q = _counted(self._recall.at(ago, self._side), self._step)
         stamp = t if errors.stamps == "ticks" else t - ago
         if errors.stamp_jitter:
-            stamp += _HALF_WIDTH * errors.stamp_jitter * self._uniform()
+            stamp += HALF_WIDTH * errors.stamp_jitter * self._uniform()
         if self._lost() and self._last is not None:
             return self._last._replace(fresh=False)
         self._last = ShownSample(stamp, read_only(q), read_only(tau), fresh=True)
@@ -204,11 +204,4 @@ def _refuse(errors: SensorErrors, sample_period: float) -> None:
         raise SimulationError(
             "a stream cannot show torque of the future", expected="torque_delay >= 0", got=errors.torque_delay
         )
-    instants = errors.sampling_jitter if errors.stamps == "instants" else 0.0
-    widest = 2.0 * _HALF_WIDTH * max(errors.sampling_jitter, instants + errors.stamp_jitter)
-    if widest >= sample_period:
-        raise SimulationError(
-            "the jitter lets samples overtake each other",
-            expected=f"sampling and stamp jitter below {sample_period / (2.0 * _HALF_WIDTH):.3g} s together",
-            got=f"{widest / (2.0 * _HALF_WIDTH):.3g} s", remedy="lower the rate of the log, or the jitter",
-        )  # fmt: skip
+    refuse_overtaking(errors, sample_period)

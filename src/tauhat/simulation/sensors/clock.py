@@ -8,15 +8,16 @@ from tauhat.arrays import FloatArray, IntArray
 from tauhat.errors import SimulationError
 from tauhat.simulation.sensors.sensor_errors import SensorErrors
 
-_HALF_WIDTH = np.sqrt(3.0)  # of a uniform density of unit deviation
+HALF_WIDTH = np.sqrt(3.0)
+"""Of a uniform density of unit deviation."""
 
 
 def sampling_instants(errors: SensorErrors, ticks: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return when the samples are really taken, (n,) [s]: about the ticks, within the run."""
     if not errors.sampling_jitter:
         return ticks
-    _refuse_overtaking(errors, ticks)
-    off = errors.sampling_jitter * _HALF_WIDTH * rng.uniform(-1.0, 1.0, ticks.size)
+    refuse_overtaking(errors, float(np.diff(ticks).min()))
+    off = errors.sampling_jitter * HALF_WIDTH * rng.uniform(-1.0, 1.0, ticks.size)
     return np.asarray(np.clip(ticks + off, ticks[0], ticks[-1]))
 
 
@@ -27,8 +28,8 @@ def time_stamps(
     stamped = ticks if errors.stamps == "ticks" else instants
     if not errors.stamp_jitter:
         return stamped
-    _refuse_overtaking(errors, ticks)
-    return np.asarray(stamped + errors.stamp_jitter * _HALF_WIDTH * rng.uniform(-1.0, 1.0, ticks.size))
+    refuse_overtaking(errors, float(np.diff(ticks).min()))
+    return np.asarray(stamped + errors.stamp_jitter * HALF_WIDTH * rng.uniform(-1.0, 1.0, ticks.size))
 
 
 def kept_rows(errors: SensorErrors, count: int, rng: np.random.Generator) -> IntArray:
@@ -51,15 +52,20 @@ def kept_rows(errors: SensorErrors, count: int, rng: np.random.Generator) -> Int
     return np.flatnonzero(stretches % 2 == 0)
 
 
-def _refuse_overtaking(errors: SensorErrors, ticks: FloatArray) -> None:
-    """Refuse jitter that could turn the order of two samples or of their stamps round."""
-    step = float(np.diff(ticks).min())
+def refuse_overtaking(errors: SensorErrors, step: float) -> None:
+    """Refuse jitter that could turn the order of two samples or of their stamps round, a step [s] apart.
+
+    Raises
+    ------
+    SimulationError
+        says how much jitter there may be.
+    """
     instants = errors.sampling_jitter if errors.stamps == "instants" else 0.0
-    widest = 2.0 * _HALF_WIDTH * max(errors.sampling_jitter, instants + errors.stamp_jitter)
+    widest = 2.0 * HALF_WIDTH * max(errors.sampling_jitter, instants + errors.stamp_jitter)
     if widest >= step:
         raise SimulationError(
             "the jitter lets samples overtake each other",
-            expected=f"sampling and stamp jitter below {step / (2.0 * _HALF_WIDTH):.3g} s together",
-            got=f"{widest / (2.0 * _HALF_WIDTH):.3g} s",
+            expected=f"sampling and stamp jitter below {step / (2.0 * HALF_WIDTH):.3g} s together",
+            got=f"{widest / (2.0 * HALF_WIDTH):.3g} s",
             remedy="lower the rate of the log, or the jitter",
         )

@@ -14,7 +14,7 @@ from tauhat.studies.force_sensing.chapters import chapters_of, summary_of
 from tauhat.studies.force_sensing.findings import Findings
 from tauhat.studies.force_sensing.scene import SceneSettings
 from tauhat.studies.force_sensing.trials import Outcome, Trial, tried
-from tauhat.studies.study import Study, StudyResult
+from tauhat.studies.study import Study, StudyResult, require_arms
 from tauhat.workers import Workers
 
 
@@ -41,8 +41,7 @@ class ForceSensingStudy(Study):
     directions: str = "force"
 
     def __post_init__(self) -> None:
-        if self.seeds < 1:
-            raise ModelError("arms of the study", where=self.key, expected="1 seed or more", got=self.seeds)
+        require_arms(self.key, self.seeds)
         known_terms(self.terms)
         directions_named(self.directions)
         if self.robot:

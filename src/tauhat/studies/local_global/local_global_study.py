@@ -25,7 +25,7 @@ from tauhat.studies.local_global.conclusions import conclusions, summary
 from tauhat.studies.local_global.findings import FITS, Findings, blocks_of_fit
 from tauhat.studies.local_global.motions import Designs, Motions, designed
 from tauhat.studies.local_global.task import Polishing
-from tauhat.studies.study import Chapter, Study, StudyResult
+from tauhat.studies.study import Chapter, Study, StudyResult, require_arms
 from tauhat.workers import Workers
 
 _TOLD = 5  # how often a run says how far it is
@@ -63,8 +63,7 @@ class LocalGlobalStudy(Study):
     cutoff: float = 10.0
 
     def __post_init__(self) -> None:
-        if self.seeds < 1:
-            raise ModelError("arms of the study", where=self.key, expected="1 seed or more", got=self.seeds)
+        require_arms(self.key, self.seeds)
         for name in ("seconds", "cutoff"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise ModelError(f"setting {name}", where=self.key, expected="above zero", got=getattr(self, name))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from tauhat.errors import ModelError
 from tauhat.studies.polishing.arm import WARMTHS, Warmth
 from tauhat.studies.polishing.findings import Findings, Spread, finished, spread
-from tauhat.studies.polishing.sensing_ways import LOAD_CELL, NO_WARMTH, OPEN_LOOP, WITH_WARMTH
+from tauhat.studies.polishing.sensing_ways import LOAD_CELL, NO_WARMTH, OPEN_LOOP, OTHERS, SOLVED, WITH_WARMTH
+from tauhat.studies.polishing.shift import Worked
 from tauhat.studies.polishing.trials import GLOBAL, LOCAL, Outcome
 from tauhat.studies.polishing.truth import Difficulty
 from tauhat.studies.polishing.work import SHAPES
@@ -85,13 +89,12 @@ def _words(found: Findings) -> tuple[str, ...]:
     cold, steady, air = (of(name, 0) for name in (WITH_WARMTH, NO_WARMTH, _AIR))
     return (
         (
-            f"Cold, the model without warmth takes lost friction for force: {steady:.3g} %. A pass in "
-            f"air along the same path takes most of that off ({air:.3g} %), and so does the warmth that "
-            f"runs along ({cold:.3g} %)."
+            f"Cold, the model without warmth takes lost friction for force: {steady:.3g} %. With a pass in air along "
+            f"the same path it is {air:.3g} %, and with the warmth that runs along, without a pass, {cold:.3g} %."
         ),
         (
-            f"What is left is near what a load cell reaches with the same loop ({of(LOAD_CELL, 0):.3g} "
-            f"%). Pressing blindly to a depth is off by {of(OPEN_LOOP, 0):.3g} %."
+            f"A load cell reaches {of(LOAD_CELL, 0):.3g} % with the same loop; pressing blindly to a depth is off by "
+            f"{of(OPEN_LOOP, 0):.3g} %."
         ),
     )
 
@@ -166,13 +169,24 @@ def others_chapter(found: Findings) -> Chapter:
         note="Observers by name have the model without warmth and a pass in air; all solve for one direction where no "
         "other solve is named.",
     )
-    text = (
-        (
-            "The form of the observer hardly matters. What the external torque is solved for does: every "
-            "direction that is left open takes errors of the joints for force."
-        ),
-    )
+    text = tuple(_compared(found, warmth) for warmth in WARMTHS)
     return Chapter(title="Observers and solves", text=text, tables=(table,))
+
+
+def _compared(found: Findings, warmth: Warmth) -> str:
+    """Return how far observers are apart, and solves with one model."""
+
+    def of(name: str) -> float:
+        return spread(found.of(name, "easy", warmth, shape="flat")).median
+
+    figures = [of(name) for name in (_AIR, *(name for name, way in OTHERS.items() if way.air))]
+    observers = [figure for figure in figures if np.isfinite(figure)] or [np.nan]
+    solves = [of(name) for name in (WITH_WARMTH, *(f"{WITH_WARMTH}, {solve}" for solve in tuple(SOLVED)[1:]))]
+    told = ", ".join(f"for {solve} {rms:.3g} %" for solve, rms in zip(SOLVED, solves, strict=True))
+    return (
+        f"{warmth.capitalize()}, observers by name lie between {min(observers):.3g} and {max(observers):.3g} %. With "
+        f"warmth, solved {told}: a direction that is left open can take errors of the joints for force."
+    )
 
 
 def local_chapter(found: Findings) -> Chapter:
@@ -238,12 +252,20 @@ def _drawn(found: Findings, warmth: Warmth) -> Chart:
     )  # fmt: skip
 
 
-def shift_chapter(found: Findings, hours: float) -> Chapter:
-    """Return the force over a shift."""
-    names = tuple(dict.fromkeys(worked.outcome.sensor for worked in found.worked))
-    times = sorted({worked.hour for worked in found.worked})
-    rms, bias = ([_over_shift(found, name, times, figure) for name in names] for figure in ("rms", "bias"))
-    warm = [float(np.mean([w.temperature for w in found.worked if w.hour == hour])) for hour in times]
+def shift_chapter(done: Sequence[Worked], hours: float) -> Chapter:
+    """Return the force over a shift.
+
+    Raises
+    ------
+    ModelError
+        when nothing was done.
+    """
+    if not done:
+        raise ModelError("no jobs of a shift to tell of", where="polishing study", expected="one or more")
+    names = tuple(dict.fromkeys(worked.outcome.sensor for worked in done))
+    times = sorted({worked.hour for worked in done})
+    rms, bias = ([_over_shift(done, name, times, figure) for name in names] for figure in ("rms", "bias"))
+    warm = [float(np.mean([w.temperature for w in done if w.hour == hour])) for hour in times]
     charts = (
         Chart(
             title="Error of the true force over the shift", kind="lines", x_title="time [h]",
@@ -260,7 +282,7 @@ def shift_chapter(found: Findings, hours: float) -> Chapter:
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
     for name in names:
-        jobs = [worked.outcome for worked in found.worked if worked.outcome.sensor == name]
+        jobs = [worked.outcome for worked in done if worked.outcome.sensor == name]
         drift, figures = spread(jobs, "bias"), spread(jobs)
         rows.append((name, figures.median, figures.largest, drift.median, drift.high - drift.low, finished(jobs)))
     table = Table(
@@ -279,9 +301,9 @@ def shift_chapter(found: Findings, hours: float) -> Chapter:
     return Chapter(title="A shift", text=text, tables=(table,), charts=charts)
 
 
-def _over_shift(found: Findings, name: str, times: list[float], figure: str) -> Series:
+def _over_shift(done: Sequence[Worked], name: str, times: list[float], figure: str) -> Series:
     y = []
     for hour in times:
-        jobs = [w.outcome for w in found.worked if w.outcome.sensor == name and w.hour == hour]
+        jobs = [w.outcome for w in done if w.outcome.sensor == name and w.hour == hour]
         y.append(spread(jobs, figure).median)
     return Series(name=name, x=tuple(times), y=tuple(y))

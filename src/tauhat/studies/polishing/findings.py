@@ -8,8 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tauhat.studies.polishing.arm import ArmSettings, Warmth
-from tauhat.studies.polishing.meeting import Met
-from tauhat.studies.polishing.shift import Worked
 from tauhat.studies.polishing.trials import GLOBAL, Drawn, Outcome
 from tauhat.studies.polishing.truth import Difficulty
 
@@ -25,17 +23,13 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Findings:
-    """What became of all jobs.
+    """What became of the jobs of all arms.
 
-    worked : jobs of shifts
-    met : incidents
     drawn : jobs of one arm to be drawn
     """
 
     arm: ArmSettings
     outcomes: tuple[Outcome, ...]
-    worked: tuple[Worked, ...] = ()
-    met: tuple[Met, ...] = ()
     drawn: tuple[Drawn, ...] = ()
 
     @property

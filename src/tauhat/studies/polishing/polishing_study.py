@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
+from itertools import chain
 from typing import ClassVar
 
 from tauhat.errors import ModelError
 from tauhat.excitation.trajectory import Trajectory
 from tauhat.robots.library import load_robot
 from tauhat.simulation.contact.cell import Cell
+from tauhat.studies.failures import Failures
 from tauhat.studies.polishing import chapters
 from tauhat.studies.polishing.accidents import Accidents, all_met
 from tauhat.studies.polishing.arm import ArmSettings
@@ -21,7 +23,7 @@ from tauhat.studies.polishing.shift import ShiftSettings, ShiftTrial, Worked, sh
 from tauhat.studies.polishing.trials import Drawn, Outcome, Trial, tried
 from tauhat.studies.polishing.truth import DIFFICULTIES, Difficulty
 from tauhat.studies.polishing.work import postures_of
-from tauhat.studies.study import Study, StudyResult
+from tauhat.studies.study import Chapter, Study, StudyResult, require_arms
 from tauhat.workers import Workers
 
 
@@ -56,43 +58,64 @@ class PolishingStudy(Study):
     accidents: int = 1
 
     def __post_init__(self) -> None:
-        if self.seeds < 1 or not self.difficulties:
-            raise ModelError("arms of the study", where=self.key, expected="1 seed or more", got=self.seeds)
+        require_arms(self.key, self.seeds * len(self.difficulties))
         if self.robot:
             object.__setattr__(self, "arm", replace(self.arm, robot=self.robot))
         postures_of(load_robot(self.arm.robot))
 
     def run(self, workers: Workers, *, tell: Callable[[str], None] = lambda _: None) -> StudyResult:
-        """Return the force of all jobs, by what the polisher reads."""
-        found = self.found(workers, tell=tell)
-        told = [chapters.scene_chapter(found), chapters.force_chapter(found), chapters.drawn_chapter(found)]
-        told += [chapters.shapes_chapter(found), chapters.others_chapter(found)]
-        told += [chapters.local_chapter(found)] if self.local else []
-        told += [chapters.shift_chapter(found, self.shift.hours)] if self.shifts else []
-        told += [incident_chapter(found.met)] if self.accidents else []
+        """Return the force of all jobs, by what the polisher reads.
+
+        An arm, a shift or a chapter that fails is named in `failures`, and what is done stays.
+
+        Raises
+        ------
+        ModelError
+            when no arm comes through.
+        """
+        failures = Failures(tell)
+        tell("designing the calibration")
+        motion = self._whole_room()
+        found = self._found(workers, motion, failures)
+        writers: dict[str, Callable[[], Chapter]] = {
+            "From calibration to force": lambda: chapters.scene_chapter(found),
+            "The force that was pressed with": lambda: chapters.force_chapter(found),
+            "One arm at work": lambda: chapters.drawn_chapter(found),
+            "Flat and curved workpieces": lambda: chapters.shapes_chapter(found),
+            "Observers and solves": lambda: chapters.others_chapter(found),
+        }
+        if self.local:
+            writers["Local and global calibration"] = lambda: chapters.local_chapter(found)
+        if self.shifts:
+            writers["A shift"] = lambda: chapters.shift_chapter(
+                self._worked(workers, motion, failures), self.shift.hours
+            )
+        if self.accidents:
+            writers["When something goes wrong"] = lambda: incident_chapter(self._met(workers, motion, failures))
+        told = tuple(failures.chapter(title, write) for title, write in writers.items())
         return StudyResult(
-            name=self.key, title=f"{self.title}: {self.arm.robot}", summary=chapters.summary_of(found),
-            chapters=tuple(told), settings={"seeds": self.seeds, **asdict(self.arm)},
+            name=self.key, title=f"{self.title}: {self.arm.robot}",
+            summary=failures.summary(chapters.summary_of(found)), chapters=told,
+            settings={"seeds": self.seeds, **asdict(self.arm)}, failures=failures.lines,
         )  # fmt: skip
 
-    def found(self, workers: Workers, *, tell: Callable[[str], None] = lambda _: None) -> Findings:
-        """Return what the chapters are written from."""
-        robot, seconds = load_robot(self.arm.robot), self.arm.calibration.seconds
-        tell("designing the calibration")
-        terms = self.arm.calibration.textbook
-        motion = whole_room(robot, self.motions, terms=terms, seconds=seconds)
+    def _whole_room(self) -> Trajectory:
+        calibration = self.arm.calibration
+        return whole_room(
+            load_robot(self.arm.robot), self.motions, terms=calibration.textbook, seconds=calibration.seconds
+        )
+
+    def _found(self, workers: Workers, motion: Trajectory, failures: Failures) -> Findings:
+        """Return what most chapters are written from."""
         near = self._near(workers) if self.local else None
-        trials = self._trials(motion, near)
         outcomes: list[Outcome] = []
         drawn: list[Drawn] = []
-        for number, (found, shown) in enumerate(workers.map(tried, trials), start=1):
+        for found, shown in failures.results(workers, tried, self._trials(motion, near), what="arms"):
             outcomes += found
             drawn += shown
-            tell(f"{number} of {len(trials)} arms")
-        return Findings(
-            arm=self.arm, outcomes=tuple(outcomes), worked=self._worked(workers, motion, tell),
-            met=self._met(workers, motion, tell), drawn=tuple(drawn),
-        )  # fmt: skip
+        if not outcomes:
+            raise ModelError("no arm came through", where=self.key, got=failures.lines[0])
+        return Findings(arm=self.arm, outcomes=tuple(outcomes), drawn=tuple(drawn))
 
     def _trials(self, motion: Trajectory, near: Trajectory | None) -> list[Trial]:
         return [
@@ -112,22 +135,14 @@ class PolishingStudy(Study):
         once = where_the_work_is(robot, self.arm.work, posture, self.motions, terms=terms, workers=workers)
         return over_and_over(once, self.arm.calibration.seconds)
 
-    def _worked(self, workers: Workers, motion: Trajectory, tell: Callable[[str], None]) -> tuple[Worked, ...]:
+    def _worked(self, workers: Workers, motion: Trajectory, failures: Failures) -> tuple[Worked, ...]:
         trials = [
             ShiftTrial(settings=self.arm, shift=self.shift, seed=self.first_seed + seed, motion=motion)
             for seed in range(self.shifts)
         ]
-        worked: list[Worked] = []
-        for number, found in enumerate(workers.map(shift_of, trials), start=1):
-            worked += found
-            tell(f"{number} of {len(trials)} shifts")
-        return tuple(worked)
+        return tuple(chain.from_iterable(failures.results(workers, shift_of, trials, what="shifts")))
 
-    def _met(self, workers: Workers, motion: Trajectory, tell: Callable[[str], None]) -> tuple[Met, ...]:
+    def _met(self, workers: Workers, motion: Trajectory, failures: Failures) -> tuple[Met, ...]:
         seeds = range(self.first_seed, self.first_seed + self.accidents)
         trials = [Accidents(settings=self.arm, seed=seed, motion=motion) for seed in seeds]
-        met: list[Met] = []
-        for number, found in enumerate(workers.map(all_met, trials), start=1):
-            met += found
-            tell(f"incidents of {number} of {len(trials)} arms")
-        return tuple(met)
+        return tuple(chain.from_iterable(failures.results(workers, all_met, trials, what="arms with incidents")))

@@ -10,7 +10,7 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.control.force.reading import ForceReading
-from tauhat.sensing.sensor import ForceSensor
+from tauhat.sensing.sensor import ForceSensor, Sensed
 from tauhat.sensing.wrench import WrenchSolver
 from tauhat.sensing.zero import AirPass
 from tauhat.simulation.contact.running_cell import CellSample
@@ -94,15 +94,17 @@ class SensedReading(ForceReader):
     def read(self, memory: FloatArray, sample: CellSample, place: Place) -> tuple[FloatArray, ForceReading | None]:
         """Return the force along the tool's axis with its error; none while the sensor settles."""
         memory, sensed = self.sensor.advance(memory, sample.q, sample.tau)
-        if not sensed.settled:
-            return memory, None
+        return memory, self.solved(sensed, place) if sensed.settled else None
+
+    def solved(self, sensed: Sensed, place: Place) -> ForceReading:
+        """Return the force along the tool's axis, with its error, that makes this external torque."""
         tau = sensed.tau
         if self.zero is not None:
             tau = tau - self.zero.torque_at(np.array([place.progress]))[0]
         solver = self.solvers[round(place.along)]
         found = solver.along(sensed.q[None], tau[None], sensed.variance[None], own=np.square(sensed.lag)[None])
         force = float(self.normal @ found.wrench[0])
-        return memory, ForceReading(force, float(np.sqrt(self.normal @ found.covariance[0] @ self.normal)))
+        return ForceReading(force, float(np.sqrt(self.normal @ found.covariance[0] @ self.normal)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

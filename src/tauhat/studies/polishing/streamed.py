@@ -9,7 +9,6 @@ import numpy as np
 
 from tauhat.control.force.reading import ForceReading
 from tauhat.errors import SensingError
-from tauhat.sensing.sensor import Sensed
 from tauhat.sensing.stream import SensorStream, StreamMemory
 from tauhat.simulation.contact.running_cell import CellSample
 from tauhat.studies.polishing.readers import ForceReader, Place, SensedReading
@@ -20,7 +19,7 @@ class StreamedMemory(NamedTuple):
 
     stream : None once the stream has ended: its samples came at another rate
     last : the last sample taken
-    held, stood : how many samples in a row had its torque, and its position while the tool was fed
+    held, stood : how many samples in a row had its torque, and how many had its position although the tool was fed
     """
 
     stream: StreamMemory | None
@@ -76,23 +75,19 @@ class StreamedReading(ForceReader):
         after = _counted(memory, sample, place)._replace(stream=stream, last=sample)
         if max(after.held, after.stood) >= self.still_after:
             return after, None
-        return after, self._solved(told, place)
-
-    def _solved(self, told: Sensed, place: Place) -> ForceReading:
-        sensed = self.sensed
-        zero = 0.0 if sensed.zero is None else sensed.zero.torque_at(np.array([place.progress]))[0]
-        solver = sensed.solvers[round(place.along)]
-        found = solver.along(told.q[None], (told.tau - zero)[None], told.variance[None], own=np.square(told.lag)[None])
-        normal = sensed.normal
-        return ForceReading(float(normal @ found.wrench[0]), float(np.sqrt(normal @ found.covariance[0] @ normal)))
+        return after, self.sensed.solved(told, place)
 
 
 def _counted(memory: StreamedMemory, sample: CellSample, place: Place) -> StreamedMemory:
-    """Return the memory with the number of samples alike."""
+    """Return the memory with the number of samples alike.
+
+    A position that stood while the tool was fed goes on counting as such until it changes: a polisher that holds for
+    want of readings comes to rest, and would feed again on the same position.
+    """
     last = memory.last
     if last is None:
         return memory
     held = memory.held + 1 if np.array_equal(last.tau, sample.tau) else 0
-    fed = place.along != 0.0
-    stood = memory.stood + 1 if fed and np.array_equal(last.q, sample.q) else 0
+    fed = int(place.along != 0.0)
+    stood = memory.stood + fed if np.array_equal(last.q, sample.q) else 0
     return memory._replace(held=held, stood=stood)
