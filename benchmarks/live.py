@@ -31,6 +31,7 @@ import numpy as np
 from sensing import arm, motion
 from tauhat.live import Channels, Feed, Limits, Service, serve
 from tauhat.live.connection import Connection, connect
+from tauhat.live.priority import take_realtime_priority
 from tauhat.sensing import ForceSensor, assumed_contact_thresholds
 
 RATE, N_V = 1000.0, 7
@@ -43,11 +44,6 @@ BROWSER = (
 )  # fmt: skip
 
 
-def hurry() -> None:
-    """Take real-time priority, so that only what the kernel and this benchmark do is waited for."""
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(20))
-
-
 def serve_here(folder: Path, *, with_page: bool, limits: Limits, realtime: bool = False) -> None:
     """Be the server, until a signal comes."""
     page = None
@@ -57,7 +53,7 @@ def serve_here(folder: Path, *, with_page: bool, limits: Limits, realtime: bool 
 
         page = start_page(sensor.model.robot, frame=str(sensor.solver.frame), port=0)
     if realtime:
-        hurry()
+        take_realtime_priority()
     thresholds = assumed_contact_thresholds(sensor)
     service = Service(sensor=sensor, thresholds=thresholds, feed=Feed(page), limits=limits)
     channels = Channels(websocket=0, udp=0, pipe=folder / "samples")
@@ -166,7 +162,7 @@ def main() -> None:
     flags = [name for name, wanted in (("--page", shown), ("--realtime", options.realtime)) if wanted]
     with server(*flags) as (addresses, process), browser(addresses["page"]) if options.browser else nullcontext():
         if options.realtime:
-            hurry()
+            take_realtime_priority()
         found = report(addresses, seconds)
         ticks = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
     result = {

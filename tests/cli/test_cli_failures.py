@@ -286,15 +286,51 @@ def test_each_warning_is_printed_once_in_one_line(capsys: pytest.CaptureFixture[
     assert others == ["warning: second", "warning: RuntimeWarning: overflow"]
 
 
-@pytest.mark.parametrize("words", [("inspect", "ur5e"), ("inspect", "ur5e", "--json")])
-def test_a_reader_that_leaves_early_causes_no_complaint(words: tuple[str, ...]) -> None:
+def run_unread(words: tuple[object, ...], unread: str, given: bytes = b"") -> subprocess.CompletedProcess[bytes]:
+    """Run `tauhat` with a standard output or error whose reader has left."""
     reading, writing = os.pipe()
     os.close(reading)
-    command = [shutil.which("tauhat", path=Path(sys.executable).parent) or "tauhat", *words]
-    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, timeout=60, check=False)
+    program = shutil.which("tauhat", path=Path(sys.executable).parent) or "tauhat"
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, unread: writing}
+    command = [program, *map(str, words)]
+    done = subprocess.run(command, input=given, timeout=120, check=False, **streams)
     os.close(writing)
+    return done
+
+
+@pytest.mark.parametrize("words", [("inspect", "ur5e"), ("inspect", "ur5e", "--json"), ("--help",), ("--version",)])
+def test_a_reader_that_leaves_early_causes_no_complaint(words: tuple[str, ...]) -> None:
+    done = run_unread(words, "stdout")
     assert done.stderr == b""
-    assert done.returncode == -signal.SIGPIPE
+    assert done.returncode == 128 + signal.SIGPIPE
+
+
+def test_a_reader_of_answers_or_of_errors_that_leaves_ends_the_program(workshop: Workshop) -> None:
+    sample = b'{"t": 0.0, "q": [0, 0], "tau": [0, 0]}\n'
+    words = ("sense", workshop.estimate, "--input", "-", "--rate", 250)
+    assert run_unread(words, "stdout", sample).returncode == 128 + signal.SIGPIPE
+    assert run_unread(("verify", workshop.estimate, "nowhere.csv"), "stderr").returncode == 128 + signal.SIGPIPE
+
+
+def test_whoever_leaves_a_socket_is_an_error_there_and_ends_no_program() -> None:
+    code = (
+        "import socket\nfrom tauhat.cli import app\ndef serve():\n    ours, theirs = socket.socketpair()\n"
+        "    theirs.close()\n    try:\n        ours.send(b'answer')\n    except BrokenPipeError:\n"
+        "        print('has left')\napp.app = serve\napp.main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "has left\n", "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is full")
+@pytest.mark.parametrize("words", [("robots",), ("robots", "--json")])
+def test_an_output_that_is_full_is_one_line(words: tuple[str, ...]) -> None:
+    command = [sys.executable, "-m", "tauhat", *words]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
 
 
 def test_closed_streams_cause_no_complaint() -> None:

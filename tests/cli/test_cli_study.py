@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -93,6 +94,26 @@ def test_an_unknown_study_is_refused_with_the_known_ones(tauhat: Tauhat) -> None
     assert result.exit_code == 1
     assert "unknown study" in result.stderr
     assert "crs-a465" in result.stderr
+
+
+def test_a_study_that_could_not_do_all_shows_the_rest_and_leaves_with_status_one(
+    tauhat: Tauhat, asked: Asked, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    whole = registry.STUDIES["crs-a465"].run
+    monkeypatch.setattr(
+        registry.STUDIES["crs-a465"],
+        "run",
+        lambda *given, **kept: replace(whole(*given, **kept), failures=("No end.",)),
+    )
+    page = tmp_path / "page.html"
+    result = tauhat(*WORDS, "--json", "-o", page)
+    assert asked
+    assert result.exit_code == 1
+    said = json.loads(result.stdout)
+    assert said["failures"] == ["No end."]
+    assert said["chapters"][1]["text"] == ["so"]
+    assert "error: No end." in result.stderr
+    assert "noted" in page.read_text(encoding="utf-8")
 
 
 WIDE = Table(

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from cli_workshop import Tauhat, Workshop, made
+from cli_workshop import Tauhat, Workshop, made, piped, pushed, sample_lines
 
 from tauhat.cli.experiment import Plan, run_experiment
 from tauhat.excitation.fourier import random_fourier
@@ -37,11 +37,10 @@ class Bench:
 def bench(workshop: Workshop, tmp_path_factory: pytest.TempPathFactory) -> Bench:
     """Return the workshop's estimate, a log of another motion, and the same with a push from the middle on."""
     folder = tmp_path_factory.mktemp("sensing")
-    log, solver = read_recording(workshop.other_log), WrenchSolver(robot=load_robot("two_link"))
-    external = np.array([solver.jacobian(q)[0].T @ PUSH for q in log.q])
-    external[:BEGIN] = 0.0
-    wrench = np.where(np.arange(log.n_t)[:, None] < BEGIN, 0.0, PUSH)
-    write_recording(replace(log, tau=log.tau - external, wrench=wrench), folder / "pushed.parquet")
+    log = read_recording(workshop.other_log)
+    during = np.arange(log.n_t) >= BEGIN
+    touched = replace(pushed(log, PUSH, during), wrench=np.where(during[:, None], PUSH, 0.0))
+    write_recording(touched, folder / "pushed.parquet")
     return Bench(folder, workshop.estimate, workshop.other_log, folder / "pushed.parquet")
 
 
@@ -124,19 +123,6 @@ def test_a_tool_that_payload_weighed_is_no_force_any_more(bench: Bench, tmp_path
         assert before["rms"] > 10.0 * after["rms"]
 
 
-def piped(estimate: Path, text: str | bytes, *words: str) -> subprocess.CompletedProcess[bytes]:
-    command = [sys.executable, "-m", "tauhat", "sense", str(estimate), "--input", "-", *words]
-    given = text.encode() if isinstance(text, str) else text
-    return subprocess.run(command, input=given, capture_output=True, timeout=120, check=False)
-
-
-def sample_lines(log: Recording) -> list[str]:
-    return [
-        json.dumps({"t": t, "q": q.tolist(), "tau": tau.tolist()})
-        for t, q, tau in zip(log.t, log.q, log.tau, strict=True)
-    ]
-
-
 def test_every_valid_line_is_answered_and_the_others_are_counted(bench: Bench, tmp_path: Path) -> None:
     log, out = read_recording(bench.pushed), tmp_path / "out.parquet"
     given = sample_lines(log)
@@ -150,7 +136,7 @@ def test_every_valid_line_is_answered_and_the_others_are_counted(bench: Bench, t
         *given[40:],
     ]
     mixed.insert(42, json.dumps({"t": 0.161, "q": [None, 0], "tau": [0, 0]}))
-    result = piped(bench.estimate, "\n".join(mixed), "--rate", "250")
+    result = piped(bench.estimate, mixed, "--rate", "250")
     assert result.returncode == 0, result.stderr
     answers = [json.loads(line) for line in result.stdout.splitlines()]
     assert [answer["t"] for answer in answers] == log.t.tolist()
@@ -178,7 +164,7 @@ def test_an_answer_comes_before_the_next_sample_is_given(bench: Bench) -> None:
 
 def test_csv_with_a_header_is_read_as_well(bench: Bench) -> None:
     text = pl.read_parquet(bench.free)[:100].write_csv()
-    result = piped(bench.estimate, text, "--rate", "250")
+    result = piped(bench.estimate, text.splitlines(), "--rate", "250")
     assert result.returncode == 0, result.stderr
     assert len(result.stdout.splitlines()) == 100
 
@@ -193,7 +179,7 @@ def test_csv_with_a_header_is_read_as_well(bench: Bench) -> None:
     ],
 )
 def test_a_stream_of_something_else_is_refused_in_one_line(bench: Bench, text, rate, message) -> None:
-    result = piped(bench.estimate, text, "--rate", rate)
+    result = piped(bench.estimate, text.splitlines(), "--rate", rate)
     assert result.returncode == 1
     said = result.stderr.decode()
     assert message in said
@@ -236,6 +222,11 @@ def test_another_robots_log_is_refused(bench: Bench, tauhat: Tauhat, tmp_path: P
         ("--input", "-"),
         ("--input", "file", "--rate", 250),
         ("--input", "-", "--rate", 250, "--json"),
+        ("--input", "-", "--rate", 250, "--map", "map.toml"),
+        ("--input", "-", "--rate", 250, "--rows", "0:9"),
+        ("--input", "-", "--rate", 250, "-o", "out.csv"),
+        ("--input", "-", "--rate", 250, "--report", "page.html"),
+        ("--input", "-", "--rate", 250, "--alarms", 5),
         ("--gain", 0),
     ],
 )

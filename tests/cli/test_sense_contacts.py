@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from cli_workshop import Tauhat, Workshop, made
+from cli_workshop import Tauhat, Workshop, made, piped, pushed, sample_lines
 
 from tauhat.recordings import read_recording, write_recording
-from tauhat.robots import load_robot
-from tauhat.sensing import WrenchSolver
 
 FORCE = np.array([30.0, 0.0, -40.0, 0.0, 0.0, 0.0])
 FIRST, LAST = 3.0, 3.6  # seconds of the push
@@ -31,20 +27,15 @@ class Bench:
 @pytest.fixture(scope="module")
 def bench(workshop: Workshop, tmp_path_factory: pytest.TempPathFactory) -> Bench:
     folder = tmp_path_factory.mktemp("contacts")
-    log, solver = read_recording(workshop.other_log), WrenchSolver(robot=load_robot("two_link"))
-    external = np.array([solver.jacobian(q)[0].T @ FORCE for q in log.q])
-    external[(log.t < FIRST) | (log.t >= LAST)] = 0.0
-    write_recording(replace(log, tau=log.tau - external), folder / "pushed.parquet")
+    log = read_recording(workshop.other_log)
+    write_recording(pushed(log, FORCE, (log.t >= FIRST) & (log.t < LAST)), folder / "pushed.parquet")
     return Bench(workshop.estimate, workshop.other_log, folder / "pushed.parquet")
 
 
 def answers(bench: Bench, log: Path, *words: str) -> list[dict[str, Any]]:
     """Return what is answered to the samples of a log through a pipe."""
-    recording = read_recording(log)
-    rows = zip(recording.t, recording.q, recording.tau, strict=True)
-    given = "\n".join(json.dumps({"t": t, "q": q.tolist(), "tau": tau.tolist()}) for t, q, tau in rows)
-    command = [sys.executable, "-m", "tauhat", "sense", str(bench.estimate), "--input", "-", "--rate", "250"]
-    done = subprocess.run([*command, *words], input=given.encode(), capture_output=True, timeout=120, check=True)
+    done = piped(bench.estimate, sample_lines(read_recording(log)), "--rate", "250", *words)
+    assert done.returncode == 0, done.stderr
     return [json.loads(text) for text in done.stdout.splitlines()]
 
 

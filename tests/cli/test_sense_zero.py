@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from cli_workshop import Tauhat, Workshop, made
+from cli_workshop import Tauhat, Workshop, made, piped, pushed, sample_lines
 
 from tauhat.recordings import read_recording, write_recording
-from tauhat.robots import load_robot
-from tauhat.sensing import WrenchSolver
 
 WEIGHT = np.array([0.0, 0.0, -20.0, 0.0, 0.0, 0.0])
 OFFSET = 0.8  # Nm on each joint that no model knows
@@ -44,10 +40,7 @@ def bench(workshop: Workshop, tmp_path_factory: pytest.TempPathFactory) -> Bench
         for name in ("air", "free")
     }
     logs["coarse"] = replace(logs["free"], **{name: getattr(logs["free"], name)[::2] for name in log_parts(log)})
-    solver = WrenchSolver(robot=load_robot("two_link"))
-    weight = np.array([solver.jacobian(q)[0].T @ WEIGHT for q in log.q])
-    weight[log.t < 4.0] = 0.0
-    logs["carrying"] = replace(logs["free"], tau=logs["free"].tau - weight)
+    logs["carrying"] = pushed(logs["free"], WEIGHT, log.t >= 4.0)
     for name, given in logs.items():
         write_recording(given, folder / f"{name}.parquet")
     return Bench(workshop.estimate, *(folder / f"{name}.parquet" for name in ("air", "free", "coarse", "carrying")))
@@ -80,6 +73,40 @@ def test_free_motion_teaches_the_error_bars_and_the_file_keeps_them(bench: Bench
     assert learnt["error"]["rms"] == pytest.approx([joint["rms"] for joint in seen])
     assert min(learnt["error"]["rms"]) > 0.9 * OFFSET
     assert json.loads(limits.read_text(encoding="utf-8"))["schema_version"] == 2
+
+
+def test_error_bars_are_those_of_what_is_told_less_a_standing_zero(
+    bench: Bench, tauhat: Tauhat, tmp_path: Path
+) -> None:
+    log, limits = read_recording(bench.free), tmp_path / "limits.json"
+    rng = np.random.default_rng(1)
+    tau = log.tau[0] + rng.normal(scale=0.05, size=log.tau.shape)
+    held = replace(log, q=np.repeat(log.q[:1], log.n_t, axis=0), dq=None, tau=tau)
+    write_recording(held, tmp_path / "held.parquet")
+    words = (bench.estimate, tmp_path / "held.parquet", "--thresholds", limits)
+    plain = document(*words, "--free", tmp_path / "held.parquet")
+    less = document(*words, "--free", tmp_path / "held.parquet", "--zero", "standing")
+    assert max(less["error"]["rms"]) < 0.2 * min(plain["error"]["rms"])
+    assert bars(document(*words, "--zero", "standing")) == bars(less)
+    result = tauhat("sense", *words)
+    assert result.exit_code == 1
+    assert "behind a standing zero" in result.stderr
+
+
+def test_thresholds_of_another_estimate_are_refused_and_those_of_none_are_taken_with_a_note(
+    bench: Bench, tauhat: Tauhat, tmp_path: Path
+) -> None:
+    limits, other = tmp_path / "limits.json", tmp_path / "other.json"
+    document(bench.estimate, bench.free, "--free", bench.air, "--thresholds", limits)
+    made("identify", "two_link", bench.air, "-o", other, "--model", "plain")
+    result = tauhat("sense", other, bench.free, "--thresholds", limits)
+    assert result.exit_code == 1
+    assert "thresholds of another estimate" in result.stderr
+    data = json.loads(limits.read_text(encoding="utf-8"))
+    del data["estimate"]
+    limits.write_text(json.dumps(data), encoding="utf-8")
+    done = made("sense", other, bench.free, "--thresholds", limits)
+    assert "do not say of which estimate" in " ".join(done.stderr.split())
 
 
 def test_a_free_log_of_another_rate_teaches_the_same(bench: Bench) -> None:
@@ -149,12 +176,8 @@ def test_a_stream_takes_off_the_same_zero_as_a_log(bench: Bench, tmp_path: Path)
     words = ("--zero", "standing:0.3")
     out = tmp_path / "out.csv"
     data = json.loads(made("sense", bench.estimate, tmp_path / "held.parquet", *words, "-o", out, "--json").stdout)
-    lines = [
-        json.dumps({"t": t, "q": q.tolist(), "tau": tau.tolist()})
-        for t, q, tau in zip(held.t, held.q, held.tau, strict=True)
-    ]
-    command = [sys.executable, "-m", "tauhat", "sense", str(bench.estimate), "--input", "-", "--rate", "250", *words]
-    done = subprocess.run(command, input="\n".join(lines).encode(), capture_output=True, timeout=120, check=True)
+    done = piped(bench.estimate, sample_lines(held), "--rate", "250", *words)
+    assert done.returncode == 0, done.stderr
     answers = [json.loads(line) for line in done.stdout.splitlines()]
     assert data["zero"] == "standing"
     table = np.genfromtxt(out, delimiter=",", names=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tauhat.errors import MissingExtraError
 from tauhat.live.feed import Snapshot
 from tauhat.robots import Robot, forward_kinematics, load_robot
 
@@ -161,6 +163,31 @@ def test_a_client_that_came_again_is_looked_at_unless_another_was_chosen_by_hand
     page._choice.value = "first"
     page._hear_choice(SimpleNamespace(client=object()))
     assert looked_at(20.0, "third") == "first"
+
+
+def test_a_stream_that_is_chosen_is_drawn_though_it_says_nothing_any_more(server, monkeypatch):
+    from tauhat.report.live_page import LivePage
+
+    robot = load_robot("two_link")
+    page = LivePage(server, robot, clock=iter(np.arange(99.0)).__next__)
+    drawn = {}
+    for name, q in (("first", np.array([0.5, 0.5])), ("second", np.zeros(2))):
+        page.show(reading(robot, q, np.array([1.0, 0.0, 0.0]), np.eye(3), stream=name))
+        assert page._choice.value == name
+        drawn[name] = np.array(page._scene._arrow.points)
+    assert not np.allclose(drawn["first"], drawn["second"], atol=0.1)
+    page._choice.value = "first"
+    monkeypatch.setattr(server, "get_clients", lambda: {0: None})
+    page.refresh()
+    assert (np.array(page._scene._arrow.points) == drawn["first"]).all()
+
+
+def test_without_viser_the_extra_is_named(tmp_path, monkeypatch):
+    from tauhat.report.hidden_viser import hidden_server
+
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(MissingExtraError, match=r"tauhat\[live\]"):
+        hidden_server(tmp_path / "door")
 
 
 def test_a_page_may_press_and_choose_and_nothing_else(server):

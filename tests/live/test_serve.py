@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,7 @@ def test_samples_are_answered_until_sigterm_and_nothing_is_left_behind(folder: P
 
 
 def test_a_client_that_leaves_without_reading_ends_nothing(folder: Path):
-    """Its answers are written to a socket that nobody reads, which ends the programs of a command line."""
+    """Its answers are written to a socket that nobody reads: a reader of standard output that leaves ends a program."""
     words = ["serve", folder / "estimate.json", "--rate", RATE, "--pipe", folder / "left", "--no-page", "--json"]
     sample = json.dumps({"t": 0.0, "q": [0.0, 0.0], "tau": [0.0, 0.0]}).encode() + b"\n"
     command = [sys.executable, "-m", "tauhat", *map(str, words)]
@@ -108,6 +109,12 @@ def test_other_machines_are_not_let_in_without_a_token(folder: Path):
     assert "others may read the token" in run_tauhat(*words, "--token-file", secret).stderr
 
 
+def test_more_samples_a_second_than_a_client_may_send_are_refused(folder: Path):
+    refused = run_tauhat("serve", folder / "estimate.json", "--rate", "1e9", "--no-page")
+    assert refused.exit_code == 2
+    assert "4000 samples a second, not 1e+09" in " ".join(refused.stderr.replace("│", " ").split())
+
+
 def test_what_cannot_be_served_is_an_error_in_a_line(folder: Path):
     absent = run_tauhat("serve", folder / "absent.json", "--rate", RATE, "--no-page")
     assert (absent.exit_code, absent.stderr.count("\n")) == (1, 1)
@@ -115,3 +122,35 @@ def test_what_cannot_be_served_is_an_error_in_a_line(folder: Path):
     taken = run_tauhat("serve", folder / "estimate.json", "--rate", RATE, "--no-page", "--pipe", folder / "notes.txt")
     assert (taken.exit_code, taken.stderr.count("\n")) == (1, 1)
     assert "no socket is not replaced" in taken.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--zero", "air:log.parquet"), "nobody says when"),
+        (("--map", "map.toml"), "needs --robot or --free"),
+        (("--alarms", "2"), "needs --free"),
+        (("--constants", "10"), "needs --robot"),
+    ],
+)
+def test_options_that_nothing_would_heed_are_refused(folder: Path, words: tuple[str, ...], message: str):
+    refused = run_tauhat("serve", folder / "estimate.json", "--rate", RATE, "--no-page", *words)
+    assert refused.exit_code == 2
+    assert message in " ".join(refused.stderr.replace("│", " ").split())
+
+
+def test_a_standing_zero_is_off_what_clients_are_told(folder: Path):
+    log = read_recording(folder / "log.parquet").rows(0, 500)
+    held = replace(log, q=np.repeat(log.q[:1], 500, axis=0), dq=None, tau=np.repeat(log.tau[:1] + 3.0, 500, axis=0))
+    words = ["serve", folder / "estimate.json", "--rate", RATE, "--pipe", folder / "zero", "--no-page", "--json"]
+    command = [sys.executable, "-m", "tauhat", *map(str, words), "--zero", "standing:0.3"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        while process.stdout.readline() != "}\n":
+            assert process.poll() is None
+        with Sender(f"unix:{folder / 'zero'}") as sender:
+            answers = list(sender.replay(held, speed=np.inf))
+        process.send_signal(signal.SIGTERM)
+        process.communicate(timeout=10.0)
+    assert min(map(abs, answers[40]["tau_ext"])) > 1.0
+    assert max(map(abs, answers[-1]["tau_ext"])) < 0.05

@@ -22,7 +22,7 @@ from typer.testing import CliRunner
 
 from tauhat.cli.app import app
 from tauhat.dynamics import torque_model
-from tauhat.errors import LiveError
+from tauhat.errors import LiveError, SensingError
 from tauhat.estimation import identify, load_estimate
 from tauhat.live import Channels, Limits, LiveServer, Sender, Service, Snapshot
 from tauhat.live.server import serve
@@ -188,7 +188,10 @@ def test_a_robot_that_stays_away_ends_the_server_with_its_error_and_followers_ar
 
 
 def test_a_server_whose_robot_is_refused_or_gone_ends_by_itself():
-    with RtdeStandIn(PLAYED) as stand_in, pytest.raises(LiveError, match=r"server refuses the robot.*another rate"):
+    with (
+        RtdeStandIn(PLAYED) as stand_in,
+        pytest.raises(SensingError, match=r"ur://.*another rate.*expected 100 Hz.*got 500 Hz"),
+    ):
         serve(Service(sensor=sensor(100.0)), Channels(robot=robot_at(stand_in)), started=len)
     with RtdeStandIn(PLAYED) as stand_in:
         channels = Channels(robot=robot_at(stand_in))

@@ -26,6 +26,7 @@ from tauhat.recordings import Recording
 from tauhat.report.live_panel import counts_html
 from tauhat.robots.kinematics import pinocchio_model
 from tauhat.sensing import ContactDetector, WrenchSolver, zeroed
+from tauhat.sensing.judged_log import judged_log
 
 PUSHED = slice(700, 1100)
 
@@ -92,6 +93,22 @@ def test_zero_is_what_zeroing_the_log_by_it_gives():
     wanted = zeroed(sensed, np.broadcast_to(sensed.tau[999], sensed.tau.shape), solver=SENSOR.solver)
     np.testing.assert_allclose([a["wrench"] for a in answers[1000:]], wanted.wrench[1000:], rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose([a["wrench_std"] for a in answers], sensed.wrench_std, rtol=1e-5)
+
+
+def test_a_standing_zero_is_off_what_a_stream_is_told_as_along_a_log():
+    held = replace(LOG, q=np.repeat(LOG.q[:1], LOG.n_t, axis=0), tau=np.repeat(LOG.tau[:1], LOG.n_t, axis=0))
+    outbox = Outbox(LOG.n_t + 9)
+    session = Session(Service(sensor=SENSOR, thresholds=THRESHOLDS, zero="standing"), name="one", outbox=outbox)
+    for t, q, tau in zip(held.t.tolist(), held.q.tolist(), held.tau.tolist(), strict=True):
+        session.receive(json.dumps({"t": t, "q": q, "tau": tau}).encode(), t)
+    answers = [message for message in emptied(outbox) if "tau_ext" in message]
+    wanted = judged_log(SENSOR, held, THRESHOLDS, zero="standing")
+    assert np.abs(wanted.contacts.zero[-1]).max() > 1.0
+    np.testing.assert_allclose([a["tau_ext"] for a in answers], wanted.sensed.tau, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose([a["wrench"] for a in answers], wanted.sensed.wrench, rtol=1e-4, atol=1e-3)
+    assert [answer["contact"] for answer in answers] == wanted.contacts.touched.tolist()
+    with pytest.raises(LiveError, match="thresholds"):
+        Service(sensor=SENSOR, zero="standing")
 
 
 def test_another_robots_samples_end_a_session_and_malformed_ones_do_not():

@@ -358,23 +358,39 @@ def test_the_command_refuses_in_one_line_what_it_cannot_record(tmp_path):
     assert not log.exists()
 
 
-def test_a_robot_is_a_client_of_the_server_like_any_other():
-    async def served(link: RobotLink) -> dict[str, int]:
-        clients = Clients(Service(sensor=sensor(RATE)))
-        clients.service.warm_up()
-        task = asyncio.create_task(stream_robot(link, clients))
-        while not any(client.session.counts["taken"] >= 150 for client in clients._clients):
-            await asyncio.sleep(0.02)
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-        return dict(clients.totals)
+async def taken_by_a_server(link: RobotLink, count: int) -> dict[str, int]:
+    """Return the server's totals when it has taken so many samples of a robot, or refused it."""
+    clients = Clients(Service(sensor=sensor(RATE)))
+    clients.service.warm_up()
+    task = asyncio.create_task(stream_robot(link, clients))
+    while not any(client.session.counts["taken"] >= count for client in clients._clients):
+        await asyncio.sleep(0.02)
+        if task.done():
+            await task
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+    return dict(clients.totals)
 
+
+def test_a_robot_is_a_client_of_the_server_like_any_other():
     with RtdeStandIn(PLAYED) as stand_in:
         link = robot_at(stand_in).connect()
-        totals = asyncio.run(served(link))
+        totals = asyncio.run(taken_by_a_server(link, 150))
     assert totals["clients"] == 1
     assert 150 <= totals["taken"] <= link.counts.taken
     assert totals["malformed"] == totals["late"] == totals["not_finite"] == 0
+
+
+def test_a_robot_of_which_most_cycles_are_lost_is_not_of_another_rate():
+    """Steps of five and two periods in turn: only the controller can say that it has 500 Hz."""
+    told = np.arange(len(PLAYED["timestamp"])) % 7
+    lossy = {name: values[(told == 0) | (told == 5)] for name, values in PLAYED.items()}
+    with RtdeStandIn(lossy) as stand_in:
+        link = robot_at(stand_in).connect()
+        assert asyncio.run(taken_by_a_server(link, 250))["taken"] >= 250
+        assert link.counts.lost > 500
+    with RtdeStandIn(lossy) as stand_in, robot_at(stand_in).connect() as link:
+        assert len(list(islice(sensed(sensor(RATE), link), 250))) == 250
 
 
 def test_a_robot_that_the_server_loses_or_refuses_is_an_error():
@@ -384,6 +400,6 @@ def test_a_robot_that_the_server_loses_or_refuses_is_an_error():
     faults = {60: "disconnect"}
     with RtdeStandIn(PLAYED, faults=faults, absent=60.0) as stand_in, pytest.raises(LiveError, match="robot is gone"):
         asyncio.run(served(robot_at(stand_in, patience=0.5).connect(), RATE))
-    message = r"the server refuses the robot.*another rate"
-    with RtdeStandIn(PLAYED) as stand_in, pytest.raises(LiveError, match=message):
+    message = r"ur://.*another rate.*got 500 Hz"
+    with RtdeStandIn(PLAYED) as stand_in, pytest.raises(SensingError, match=message):
         asyncio.run(served(robot_at(stand_in).connect(), 100.0))

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
-from pathlib import Path
-from typing import Annotated, TextIO
+from typing import Annotated
 
 import typer
 
@@ -36,6 +34,7 @@ from tauhat.cli.commands import (
     view,
 )
 from tauhat.cli.reporting import ReportingGroup
+from tauhat.cli.standard_streams import usable
 
 app = typer.Typer(
     name="tauhat",
@@ -96,15 +95,5 @@ def _leave(number: int, _: object) -> None:
 def main() -> None:
     """Run the command line; characters that the terminal cannot show are replaced."""
     signal.signal(signal.SIGTERM, _leave)
-    if sys.platform != "win32":
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # files are never written while something is printed
-    sys.stdout, sys.stderr = _usable(sys.stdout), _usable(sys.stderr)
+    sys.stdout, sys.stderr = usable(sys.stdout), usable(sys.stderr)
     app()
-
-
-def _usable(stream: TextIO | None) -> TextIO:
-    """Return the stream, or one to nowhere where the caller has closed it."""
-    if stream is None:
-        return Path(os.devnull).open("w", encoding="utf-8")  # stays open as long as the program runs
-    stream.reconfigure(errors="replace")  # type: ignore[attr-defined]
-    return stream

@@ -1,4 +1,4 @@
-"""From options of `tauhat sense` to thresholds of contact, the error they count in, and what is taken off before."""
+"""From options to thresholds of contact, the error they count in, and what is taken off before."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tauhat.cli.zero_choice import ZeroChoice
 from tauhat.errors import SensingError, TauhatWarning
 
 if TYPE_CHECKING:
+    from tauhat.cli.sensing_options import SensingOptions
     from tauhat.recordings.log import Log
     from tauhat.sensing.contact_thresholds import ContactThresholds
     from tauhat.sensing.sensor import ForceSensor
@@ -38,6 +39,25 @@ class Prepared(NamedTuple):
     thresholds: ContactThresholds
     air: AirPass | None
     source: Source
+
+
+def prepared(options: SensingOptions, sensor: ForceSensor, *, logs: Sequence[Path] = ()) -> Prepared:
+    """Return what the options say of contacts, in the error of free motion where there is any.
+
+    Parameters
+    ----------
+    logs : that are sensed along, and must not be written over
+
+    Raises
+    ------
+    TauhatError
+        as `ContactChoice.prepared`.
+    """
+    choice = ContactChoice(
+        free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms,
+        map_file=options.map_file, zero=options.zero or ZeroChoice(), inputs=(*options.inputs, *logs),
+    )  # fmt: skip
+    return choice.prepared(sensor)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,7 +99,7 @@ class ContactChoice:
             return self._learnt(sensor, air)
         if self.thresholds is not None:
             found = self._read(self.thresholds)
-            check_taken_off(found, air)
+            check_taken_off(found, air, zero=self.zero.told)
             source: Source = "thresholds" if found.error is not None and found.error.is_learnt else "fit"
             return Prepared(found.sensor_of(sensor), found, air, source)
         return Prepared(sensor, assumed_contact_thresholds(sensor, rules=self.zero.rules), air, "fit")
@@ -98,13 +118,32 @@ class ContactChoice:
                 remedy="give another pass of the same motion with --free: what remains of it is what is learnt",
             )  # fmt: skip
         logs = [read_log(log, map=self.map_file) for log in self.free]
-        taught, source = _taught(sensor, logs, air)
+        taught, source = self._taught(sensor, logs, air)
+        error = error_of(taught, zero=self.zero.told if source == "free motion" else "as sensed")
         learnt = learn_contact_thresholds(
-            sensor, logs, rate=self.alarms or _ALARMS, rules=self.zero.rules, air=air, error=error_of(taught)
+            sensor, logs, rate=self.alarms or _ALARMS, rules=self.zero.rules, air=air, error=error
         )
         if self.thresholds is not None:
             learnt.save(self.thresholds)
         return Prepared(taught, learnt, air, source)
+
+    def _taught(self, sensor: ForceSensor, logs: Sequence[Log], air: AirPass | None) -> tuple[ForceSensor, Source]:
+        """Return the sensor with the error that it shows in free motion, where there is enough of it."""
+        from tauhat.sensing.contact_rules import ContactRules
+        from tauhat.sensing.free_logs import sensed_free, settled_seconds
+        from tauhat.sensing.free_motion import FEWEST_SECONDS, learnt_from_free_motion
+
+        seconds = settled_seconds(sensed_free(sensor, logs, air=air))
+        if seconds < FEWEST_SECONDS:
+            warnings.warn(
+                f"{seconds:.1f} s of free motion are too few to learn an error bar from, {FEWEST_SECONDS:g} s are "
+                "needed: error bars are those of the fit",
+                TauhatWarning,
+                stacklevel=3,
+            )
+            return sensor, "fit"
+        standing = (self.zero.rules or ContactRules()) if self.zero.told == "standing" else None
+        return learnt_from_free_motion(sensor, logs, air=air, standing=standing), "free motion"
 
     def _read(self, path: Path) -> ContactThresholds:
         from tauhat.sensing.contact_thresholds import load_contact_thresholds
@@ -124,20 +163,3 @@ class ContactChoice:
 
 def _zero_words(zero: StandingZero) -> str:
     return f"standing:{zero.seconds:g}:{zero.follow:g}" if zero.seconds else "none"
-
-
-def _taught(sensor: ForceSensor, logs: Sequence[Log], air: AirPass | None) -> tuple[ForceSensor, Source]:
-    """Return the sensor with the error that it shows in free motion, where there is enough of it."""
-    from tauhat.sensing.free_logs import sensed_free, settled_seconds
-    from tauhat.sensing.free_motion import FEWEST_SECONDS, learnt_from_free_motion
-
-    seconds = settled_seconds(sensed_free(sensor, logs, air=air))
-    if seconds < FEWEST_SECONDS:
-        warnings.warn(
-            f"{seconds:.1f} s of free motion are too few to learn an error bar from, {FEWEST_SECONDS:g} s are needed: "
-            "error bars are those of the fit",
-            TauhatWarning,
-            stacklevel=3,
-        )
-        return sensor, "fit"
-    return learnt_from_free_motion(sensor, logs, air=air), "free motion"

@@ -32,3 +32,8 @@ def unbroken(text: str) -> Text:
     from rich.text import Text
 
     return Text(text, no_wrap=True, overflow="ignore")
+
+
+def counted(counts: Mapping[str, int], *, none: str = "none") -> str:
+    """Return how many there were of each name, without those of which there were none."""
+    return ", ".join(f"{count} {name}" for name, count in counts.items() if count) or none

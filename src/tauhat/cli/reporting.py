@@ -45,8 +45,6 @@ def one_line_reports() -> Iterator[None]:
         except MemoryError as error:
             say("error", "not enough memory; take fewer rows with --rows, or a shorter motion")
             raise typer.Exit(FAILED) from error
-        except BrokenPipeError:
-            raise  # whoever reads our output has enough; Typer leaves quietly
         except OSError as error:
             say("error", _described(error))
             raise typer.Exit(FAILED) from error

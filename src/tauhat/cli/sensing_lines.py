@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from tauhat.cli.output import counted
 from tauhat.cli.reporting import say
 
 if TYPE_CHECKING:
     from tauhat.arrays import FloatArray
     from tauhat.sensing.contact_thresholds import ContactThresholds
-    from tauhat.sensing.judged_log import Zero
     from tauhat.sensing.sensed_log import SampleCounts
     from tauhat.sensing.sensor import ForceSensor, Sensed
     from tauhat.sensing.wrench import WrenchSolver
+    from tauhat.sensing.zero import Zero
 
 
 _Judge: TypeAlias = "Callable[[Sensed], tuple[Sensed, dict[str, Any]]]"
@@ -108,6 +109,5 @@ def _sentence(counts: SampleCounts) -> str:
         "late": counts.late, "repeated": counts.repeated, "not finite": counts.not_finite,
         "malformed": counts.malformed,
     }  # fmt: skip
-    said = ", ".join(f"{count} {name}" for name, count in skipped.items() if count) or "none"
     frozen = f"; frozen, as of a controller that hangs: {counts.frozen}" if counts.frozen else ""
-    return f"{counts.taken} samples; skipped: {said}; started again {counts.restarts} times{frozen}"
+    return f"{counts.taken} samples; skipped: {counted(skipped)}; started again {counts.restarts} times{frozen}"

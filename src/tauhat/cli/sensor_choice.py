@@ -1,54 +1,39 @@
-"""From the options of `tauhat sense` to a force sensor at one rate."""
+"""From options to a force sensor at one rate."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from tauhat.cli.sensing_options import SensingOptions
     from tauhat.sensing.sensor import ForceSensor
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensorChoice:
-    """What was chosen of a sensor beside its rate."""
+def sensor_of(options: SensingOptions, rate: float) -> ForceSensor:
+    """Return the sensor for samples of this rate [Hz].
 
-    estimate: Path
-    observer: str
-    gain: float | None
-    cutoff: float | None
-    frame: str | None
-    directions: str
-    axes: Literal["base", "frame"]
-    tool: Path | None
-    stamps: Literal["auto", "exact", "jittered"]
+    Raises
+    ------
+    TauhatError
+        files that cannot be read, names that are unknown, numbers that mean nothing.
+    """
+    from dataclasses import replace
 
-    def sensor(self, rate: float) -> ForceSensor:
-        """Return the sensor for samples of this rate [Hz].
+    from tauhat.estimation.estimate import load_estimate
+    from tauhat.sensing.observers import observer_named
+    from tauhat.sensing.sensor import force_sensor
+    from tauhat.sensing.tool import load_tool
+    from tauhat.sensing.wrench import WrenchSolver, directions_named
 
-        Raises
-        ------
-        TauhatError
-            files that cannot be read, names that are unknown, numbers that mean nothing.
-        """
-        from dataclasses import replace
-
-        from tauhat.estimation.estimate import load_estimate
-        from tauhat.sensing.observers import observer_named
-        from tauhat.sensing.sensor import force_sensor
-        from tauhat.sensing.tool import load_tool
-        from tauhat.sensing.wrench import WrenchSolver, directions_named
-
-        estimate = load_estimate(self.estimate)
-        wrench = WrenchSolver(
-            robot=estimate.robot, frame=self.frame, directions=directions_named(self.directions), axes=self.axes
-        )
-        observer = observer_named(self.observer, gain=self.gain)
-        sensor = force_sensor(
-            estimate, rate=rate, observer=observer, cutoff=self.cutoff, wrench=wrench, stamps=self.stamps
-        )
-        if self.tool is None:
-            return sensor
-        tool = load_tool(self.tool)
-        return replace(sensor, model=sensor.model.carrying(tool.body, tool.link))
+    estimate = load_estimate(options.estimate)
+    wrench = WrenchSolver(
+        robot=estimate.robot, frame=options.frame, directions=directions_named(options.directions), axes=options.axes
+    )
+    observer = observer_named(options.observer, gain=options.gain)
+    sensor = force_sensor(
+        estimate, rate=rate, observer=observer, cutoff=options.cutoff, wrench=wrench, stamps=options.stamps
+    )
+    if options.tool is None:
+        return sensor
+    tool = load_tool(options.tool)
+    return replace(sensor, model=sensor.model.carrying(tool.body, tool.link))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from tauhat.cli.output import show, unbroken
+from tauhat.cli.reporting import FAILED, say
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -37,7 +38,7 @@ def experiment_of(
 
 
 def show_result(result: StudyResult, beside: Mapping[str, Any], *, page: Path | None, as_json: bool) -> None:
-    """Write the page of a study where one is wanted, and show what the study found.
+    """Write the page of a study where one is wanted, and show what the study found; leave with status 1 after failures.
 
     Parameters
     ----------
@@ -57,3 +58,7 @@ def show_result(result: StudyResult, beside: Mapping[str, Any], *, page: Path | 
             yield unbroken(f"Written: {page}")
 
     show(document, view, as_json=as_json)
+    for line in result.failures:
+        say("error", line)
+    if result.failures:
+        raise typer.Exit(FAILED)

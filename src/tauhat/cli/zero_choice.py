@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from tauhat.sensing.contact_rules import ContactRules
     from tauhat.sensing.sensor import ForceSensor
-    from tauhat.sensing.zero import AirPass
+    from tauhat.sensing.zero import AirPass, Zero
 
 _MOST_NUMBERS = 2
 
@@ -29,6 +29,11 @@ class ZeroChoice:
     kind: Literal["usual", "standing", "none", "air"] = "usual"
     numbers: tuple[float, ...] = ()
     log: Path | None = None
+
+    @property
+    def told(self) -> Zero:
+        """What torque and wrench are told less, beside a pass in air."""
+        return "standing" if self.kind == "standing" else "as sensed"
 
     @property
     def rules(self) -> ContactRules | None:
@@ -75,3 +80,17 @@ def zero_choice(text: str) -> ZeroChoice:
         return ZeroChoice(kind="standing", numbers=tuple(float(number) for number in numbers))
     except ValueError as error:
         raise typer.BadParameter(f"not a number of seconds in {text!r}") from error
+
+
+def check_without_air(zero: ZeroChoice | None) -> None:
+    """Pass unless a pass in air is to be taken off samples as they come.
+
+    Raises
+    ------
+    typer.BadParameter
+        when it is.
+    """
+    if zero is not None and zero.kind == "air":
+        raise typer.BadParameter(
+            "air:LOG is for logs: nobody says when the motion of samples begins", param_hint="'--zero'"
+        )

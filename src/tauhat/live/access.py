@@ -41,6 +41,11 @@ class Access:
     origins: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.host.strip():
+            raise LiveError(
+                "no address to listen at", where="host", got=repr(self.host),
+                remedy=f"{LOOPBACK} for this machine alone, 0.0.0.0 for all of its addresses",
+            )  # fmt: skip
         if self.token is None and not is_loopback(self.host):
             raise LiveError(
                 "other machines could connect, and there is no token", where=f"host {self.host}",

@@ -5,17 +5,23 @@ from __future__ import annotations
 import asyncio
 from collections import Counter
 from collections.abc import Callable
+from typing import TypeAlias
 
 from tauhat.errors import LiveError
 from tauhat.live.followers import Followers
+from tauhat.live.limits import Limits
 from tauhat.live.outbox import Outbox
 from tauhat.live.service import Service
 from tauhat.live.session import Session
 from tauhat.live.throttle import Throttle
 from tauhat.live.waiting_room import WaitingRoom
+from tauhat.sensing.stream import JUDGED
 
 _LOOKED = 0.05  # [s] between looks at what the page asks for
+_AGREED = frozenset({"robot"})  # whose rate was agreed on before the first sample
 _UNPROVED = frozenset({"udp"})  # where anybody's address may be written on a message: nothing goes there unasked
+
+_HangUp: TypeAlias = Callable[[], object]
 
 
 class Client:
@@ -28,12 +34,9 @@ class Client:
 
     __slots__ = ("hang_up", "heard", "outbox", "session", "throttle")
 
-    def __init__(
-        self, service: Service, *, name: str, now: float, hang_up: Callable[[], object], followers: Followers | None
-    ) -> None:
-        limits = service.limits
-        self.outbox = Outbox(limits.queue, pause=limits.notice)
-        self.session = Session(service, name=name, outbox=self.outbox, followers=followers)
+    def __init__(self, session: Session, outbox: Outbox, *, limits: Limits, now: float, hang_up: _HangUp) -> None:
+        self.session = session
+        self.outbox = outbox
         self.throttle = Throttle(limits.messages)
         self.heard = now
         self.hang_up = hang_up
@@ -68,7 +71,7 @@ class Clients:
         """Whether no more are let in."""
         return len(self._clients) >= self.service.limits.clients
 
-    def admit(self, kind: str, now: float, *, hang_up: Callable[[], object]) -> Client:
+    def admit(self, kind: str, now: float, *, hang_up: _HangUp) -> Client:
         """Return a new client with a session of its own.
 
         Parameters
@@ -88,8 +91,13 @@ class Clients:
                 remedy="come again when another has left",
             )  # fmt: skip
         self.totals["clients"] += 1
-        name, followers = f"{kind} {self.totals['clients']}", None if kind in _UNPROVED else self.followers
-        client = Client(self.service, name=name, now=now, hang_up=hang_up, followers=followers)
+        limits = self.service.limits
+        outbox = Outbox(limits.queue, pause=limits.notice)
+        session = Session(
+            self.service, name=f"{kind} {self.totals['clients']}", outbox=outbox,
+            followers=None if kind in _UNPROVED else self.followers, judged=None if kind in _AGREED else JUDGED,
+        )  # fmt: skip
+        client = Client(session, outbox, limits=limits, now=now, hang_up=hang_up)
         self._clients.add(client)
         return client
 

@@ -32,12 +32,14 @@ async def stream_robot(link: RobotLink, clients: Clients) -> None:
     Raises
     ------
     TauhatError
-        when the robot is gone for good, its samples are refused, or there are too many clients.
+        when the robot has another rate than the sensor, is gone for good, its samples are refused, or there are too
+        many clients.
     """
     from tauhat.live.conversation import converse
 
     channel = RobotChannel(link, clients.followers)
     try:
+        link.check_rate_of(clients.service.sensor)
         await converse(channel, clients, access=None)
     finally:
         channel.close()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tauhat.errors import LiveError
 from tauhat.live.feed import Feed
 from tauhat.live.limits import Limits
 from tauhat.live.protocol import hello_text
@@ -13,6 +14,7 @@ from tauhat.sensing.contact import ContactDetector
 from tauhat.sensing.contact_thresholds import ContactThresholds
 from tauhat.sensing.sensor import ForceSensor
 from tauhat.sensing.wrench import WrenchSolver
+from tauhat.sensing.zero import Zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,18 +25,24 @@ class Service:
     thresholds : of contact; None where nobody asks for it
     limits : of what a client may take
     feed : to the page
+    zero : whether what friction held as the arm came to rest is off torque and wrench as well; needs thresholds
     """
 
     sensor: ForceSensor
     thresholds: ContactThresholds | None = None
     limits: Limits = field(default_factory=Limits)
     feed: Feed = field(default_factory=Feed)
+    zero: Zero = "as sensed"
     solver: WrenchSolver = field(init=False, repr=False)
     detector: ContactDetector | None = field(init=False, repr=False)
     hello: str = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         robot = self.sensor.model.robot
+        if self.zero == "standing" and self.thresholds is None:
+            raise LiveError(
+                "the standing zero is that of contacts", where="server", remedy="give thresholds of contact"
+            )
         object.__setattr__(self, "solver", self.sensor.solver)
         object.__setattr__(self, "detector", None)
         if self.thresholds is not None:

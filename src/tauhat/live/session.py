@@ -15,7 +15,7 @@ from tauhat.live.protocol import COMMANDS, AnswerForm, Command, decoded, message
 from tauhat.live.service import Service
 from tauhat.sensing.sample_lines import Sample
 from tauhat.sensing.sensor import Sensed
-from tauhat.sensing.stream import SensorStream
+from tauhat.sensing.stream import JUDGED, SensorStream
 
 
 class Session:
@@ -27,14 +27,18 @@ class Session:
     name : how messages and the page call the stream
     outbox : where answers go
     followers : of the robot that the server reads; None where this client may not be one
+    judged : as of `SensorStream`
     """
 
-    def __init__(self, service: Service, *, name: str, outbox: Outbox, followers: Followers | None = None) -> None:
+    def __init__(
+        self, service: Service, *, name: str, outbox: Outbox, followers: Followers | None = None,
+        judged: int | None = JUDGED,
+    ) -> None:  # fmt: skip
         self.name = name
         self._service = service
         self._outbox = outbox
         self._followers = followers
-        self._stream = SensorStream(sensor=service.sensor, name=name)
+        self._stream = SensorStream(sensor=service.sensor, name=name, judged=judged)
         self._memory = self._stream.start()
         self._contact = None if service.detector is None else service.detector.start()
         self._link: str | None = None
@@ -120,24 +124,24 @@ class Session:
         self._last = sensed
         if self._memory.counts.frozen > counts.frozen:
             self._tell("frozen", now)
-        tau, wrench = self._zeroed(sensed)
-        more = self._judged(sensed, tau)
+        felt = sensed.tau if self._zero is None else sensed.tau - self._zero
+        more, standing = self._judged(sensed, felt)
+        tau, wrench = self._less(sensed, felt if standing is None else felt - standing)
         self._outbox.put(self._form.text(sample.t, (tau, sensed.variance, wrench, sensed.covariance), more))
         if self._service.feed.is_due(self.name, now):
             self._service.feed.publish(self._snapshot(sample.t, sensed, tau, wrench))
 
-    def _zeroed(self, sensed: Sensed) -> tuple[FloatArray, FloatArray]:
-        """Return external torque and wrench less the zero; its error bars stay, since they are the model's."""
-        if self._zero is None:
-            return sensed.tau, sensed.wrench
-        tau = sensed.tau - self._zero
+    def _less(self, sensed: Sensed, tau: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return external torque less what is taken off, and its wrench; error bars, which are the model's, stay."""
+        if tau is sensed.tau:
+            return tau, sensed.wrench
         return tau, self._service.solver.at(sensed.q, tau, sensed.variance + np.square(sensed.lag)).wrench
 
-    def _judged(self, sensed: Sensed, tau: FloatArray) -> str:
-        """Return what is said of contact, as further members of the answer."""
+    def _judged(self, sensed: Sensed, tau: FloatArray) -> tuple[str, FloatArray | None]:
+        """Return what is said of contact, as further members of the answer, and the zero to take off for it."""
         detector, memory = self._service.detector, self._contact
         if detector is None or memory is None:
-            return ""
+            return "", None
         self._contact, found = detector.advance(memory, tau, sensed.variance, sensed.dq, settled=sensed.settled)
         self._link = found.link
         link = "null" if found.link is None else self._links[found.link]
@@ -145,7 +149,7 @@ class Session:
         if found.contact != self._touched:
             self._touched = found.contact
             said += f', "event": "{"start" if found.contact else "end"}"'
-        return said
+        return said, found.zero if self._service.zero == "standing" else None
 
     def _snapshot(self, t: float, sensed: Sensed, tau: FloatArray, wrench: FloatArray) -> Snapshot:
         counts = self._memory.counts

@@ -19,7 +19,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -30,7 +29,7 @@ from tauhat.live import rtde_reader
 from tauhat.live.current_map import CurrentMap
 from tauhat.live.rtde_greeting import Controller, greet
 from tauhat.sensing.sensor import ForceSensor, Sensed
-from tauhat.sensing.stream import SensorStream
+from tauhat.sensing.stream import JUDGED, SensorStream
 
 SCHEME = "ur://"
 _RUNNING = 7  # the robot mode in which motors carry the arm
@@ -175,11 +174,13 @@ class RobotLink:
         """Return itself."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """End the connection."""
         self.close()
+
+    def check_rate_of(self, sensor: ForceSensor) -> None:
+        """Refuse a sensor for another rate, by `SensingError`; the controller has agreed to its own."""
+        sensor.check_rate(np.array([0.0, 1.0 / self.rate]), where=f"{SCHEME}{self.robot.address}")
 
     def close(self) -> None:
         """End the connection and what reads it."""
@@ -289,6 +290,8 @@ class RobotLink:
 def sensed(sensor: ForceSensor, samples: Iterable[LiveSample | None]) -> Iterator[tuple[LiveSample, Sensed]]:
     """Yield what a sensor makes of samples as they come; a sample that it skips is passed over.
 
+    The rate of a link is the controller's word, that of other samples is told by their time stamps.
+
     Raises
     ------
     SensingError
@@ -296,7 +299,11 @@ def sensed(sensor: ForceSensor, samples: Iterable[LiveSample | None]) -> Iterato
     LiveError
         when the robot that they come from is gone.
     """
-    stream = SensorStream(sensor=sensor, name="robot")
+    judged: int | None = JUDGED
+    if isinstance(samples, RobotLink):
+        samples.check_rate_of(sensor)
+        judged = None
+    stream = SensorStream(sensor=sensor, name="robot", judged=judged)
     memory = stream.start()
     for sample in samples:
         if sample is None:

@@ -38,7 +38,7 @@ def hidden_server(door: Path) -> Any:
     try:
         import viser
     except ImportError as error:
-        raise MissingExtraError("viser", "view") from error
+        raise MissingExtraError("viser", "live") from error
     os.environ.pop(_PORT_VARIABLE, None)
     with _listening_at(door), redirect_stdout(StringIO()):  # viser greets on standard output
         server = viser.ViserServer(host="hidden", port=0, label="tauhat", verbose=False)

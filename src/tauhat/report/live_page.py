@@ -131,6 +131,7 @@ class LivePage:
         self._choice = gui.add_dropdown("Stream", ("",), visible=False)
         self._choice.on_update(self._hear_choice)
         self._chosen = ""  # by hand
+        self._drawn: Reading | None = None
         self._plotted: Reading | None = None
         self._wrench = gui.add_html("")
         self._zero = gui.add_button("Zero", hint=_HINT, icon="circle")
@@ -149,8 +150,7 @@ class LivePage:
         stream.take(reading, now)
         self._follow(reading.stream, now)
         if stream is self._seen():
-            error = self._error(reading, stream.history)
-            self._scene.show(reading.q, np.asarray(reading.wrench)[:3], error, scale=self._scale)
+            self._draw(reading, stream.history)
 
     def refresh(self) -> None:
         """Draw words and plots if it is time to and somebody looks; call it often."""
@@ -163,6 +163,8 @@ class LivePage:
             return
         reading = stream.newest
         with self._server.atomic():
+            if self._drawn is not reading:  # another stream was chosen, and says nothing
+                self._draw(reading, stream.history)
             self._wrench.content = wrench_html(reading.wrench, reading.covariance, axes=self._axes)
             self._plots.words.content = joints_html(self._robot.joint_names, reading.tau, reading.tau_std)
             self._contacts.content = contacts_html(stream.contacts.contacts)
@@ -205,6 +207,11 @@ class LivePage:
 
     def _seen(self) -> _Stream | None:
         return self._streams.get(self._choice.value)
+
+    def _draw(self, reading: Reading, history: History) -> None:
+        error = self._error(reading, history)
+        self._scene.show(reading.q, np.asarray(reading.wrench)[:3], error, scale=self._scale)
+        self._drawn = reading
 
     def _error(self, reading: Reading, history: History) -> ErrorEllipsoid:
         """Return the error as it is drawn, and let arrow and ellipsoid fit the picture."""

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tauhat.cli.broken_pipes import outliving_readers
 from tauhat.cli.current_options import ConstantsOption, currents_of
 from tauhat.cli.options import JsonOption, frequency
-from tauhat.cli.output import show, unbroken
+from tauhat.cli.output import counted, show, unbroken
 from tauhat.cli.reporting import working
 
 if TYPE_CHECKING:
@@ -57,7 +56,6 @@ class Options:
     as_json: JsonOption = False
 
 
-@outliving_readers()
 def run(options: Options) -> None:
     """Record a running robot: positions, currents and temperatures as its controller tells them, and their map."""
     from tauhat.errors import TauhatWarning
@@ -86,9 +84,8 @@ def _view(written: RobotLog) -> Iterator[RenderableType]:
         "lost": counts.lost, "while the robot was stopped": counts.stopped, "not finite": counts.not_finite,
         "late": written.late,
     }  # fmt: skip
-    said = ", ".join(f"{count} {name}" for name, count in skipped.items() if count) or "none"
     again = f"; disconnected {counts.disconnects} times" if counts.disconnects else ""
-    yield f"{written.n_t} samples, {written.seconds:.1f} s at {written.rate:g} Hz; left out: {said}{again}"
+    yield f"{written.n_t} samples, {written.seconds:.1f} s at {written.rate:g} Hz; left out: {counted(skipped)}{again}"
     yield unbroken(f"Written: {written.log}")
     yield unbroken(f"Their map: {written.map}")
     yield unbroken(f"Next: tauhat check {written.log}")

@@ -9,28 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tauhat.cli.options import EstimateArgument, JsonOption, MapOption, RowsOption, frequency, page
+from tauhat.cli.options import JsonOption, RowsOption, frequency, page
 from tauhat.cli.output import show, unbroken
 from tauhat.cli.reporting import working
-from tauhat.cli.sensing_options import (
-    AlarmsOption,
-    AxesOption,
-    CutoffOption,
-    DirectionsOption,
-    FrameOption,
-    FreeOption,
-    GainOption,
-    ObserverOption,
-    StampsOption,
-    ThresholdsOption,
-    ToolOption,
-)
-from tauhat.cli.zero_choice import ZeroChoice, zero_choice
+from tauhat.cli.sensing_options import SensingOptions
+from tauhat.cli.zero_choice import ZeroChoice, check_without_air
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from tauhat.cli.contact_choice import ContactChoice, Prepared
+    from tauhat.cli.contact_choice import Prepared
     from tauhat.recordings.log import Log
     from tauhat.sensing.judged_log import JudgedLog
     from tauhat.sensing.sensor import ForceSensor
@@ -39,10 +27,9 @@ _STANDARD_INPUT = "-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
+class Options(SensingOptions):
     """What `tauhat sense` takes."""
 
-    estimate: EstimateArgument
     logs: Annotated[
         list[Path] | None,
         typer.Argument(metavar="LOG", help="Recordings to sense along.", show_default=False, readable=False),
@@ -54,26 +41,6 @@ class Options:
             help="External torque and wrench, sample by sample: .parquet, .csv or .csv.gz.",
         ),
     ] = None  # fmt: skip
-    observer: ObserverOption = "momentum"
-    gain: GainOption = None
-    cutoff: CutoffOption = None
-    frame: FrameOption = None
-    directions: DirectionsOption = "wrench"
-    axes: AxesOption = "base"
-    tool: ToolOption = None
-    stamps: StampsOption = "auto"
-    free: FreeOption = None
-    thresholds: ThresholdsOption = None
-    alarms: AlarmsOption = None
-    zero: Annotated[
-        ZeroChoice | None,
-        typer.Option(
-            "--zero", metavar="ZERO", parser=zero_choice, show_default="off what contacts are told by alone",
-            help="What is taken off: standing[:SECONDS[:FOLLOW]], what friction holds as the arm comes to rest; "
-            "air:LOG, the same motion without contact; none.",
-        ),
-    ] = None  # fmt: skip
-    map_file: MapOption = None
     rows: RowsOption = None
     report: Annotated[
         Path | None,
@@ -98,15 +65,11 @@ class Options:
 
 def run(options: Options) -> None:
     """Sense external torque and wrench with error bars, along logs or on samples as they come."""
-    from tauhat.cli.sensor_choice import SensorChoice
+    from tauhat.cli.contact_choice import prepared
+    from tauhat.cli.sensor_choice import sensor_of
 
-    choice = SensorChoice(
-        estimate=options.estimate, observer=options.observer, gain=options.gain, cutoff=options.cutoff,
-        frame=options.frame, directions=options.directions, axes=options.axes, tool=options.tool,
-        stamps=options.stamps,
-    )  # fmt: skip
     if options.stream is not None:
-        _answer(choice.sensor(_streamed_rate(options)), options)
+        _answer(sensor_of(options, _streamed_rate(options)), options)
         return
     if not options.logs:
         raise typer.BadParameter("a LOG, or --input - for samples from standard input")
@@ -114,7 +77,7 @@ def run(options: Options) -> None:
     with working("sensing"):
         logs = _logs(options)
         rates = [_rate(log) if options.rate is None else options.rate for log in logs]
-        known = _contacts(options).prepared(choice.sensor(min(rates)))
+        known = prepared(options, sensor_of(options, min(rates)), logs=options.logs)
         judged = [_judged(known, log, rate, options) for log, rate in zip(logs, rates, strict=True)]
     _write(judged, logs, options)
 
@@ -128,23 +91,18 @@ def run(options: Options) -> None:
 
 def _answer(sensor: ForceSensor, options: Options) -> None:
     """Answer samples from standard input; contacts are told where something is known of them, or has to be."""
+    from tauhat.cli.contact_choice import prepared
     from tauhat.cli.sensing_lines import answer
 
-    if not (options.free or options.thresholds or options.zero):
+    if not (options.free or options.thresholds or options.zero or options.alarms):
         answer(sensor)
         return
-    known = _contacts(options).prepared(sensor)
-    standing = options.zero is not None and options.zero.kind == "standing"
-    answer(known.sensor, known.thresholds, zero="standing" if standing else "as sensed")
+    known = prepared(options, sensor)
+    answer(known.sensor, known.thresholds, zero=_zero(options).told)
 
 
-def _contacts(options: Options) -> ContactChoice:
-    from tauhat.cli.contact_choice import ContactChoice
-
-    return ContactChoice(
-        free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms,
-        map_file=options.map_file, zero=options.zero or ZeroChoice(), inputs=_inputs(options),
-    )  # fmt: skip
+def _zero(options: Options) -> ZeroChoice:
+    return options.zero or ZeroChoice()
 
 
 def _streamed_rate(options: Options) -> float:
@@ -163,10 +121,7 @@ def _streamed_rate(options: Options) -> float:
             raise typer.BadParameter(
                 f"not together with {name}: samples come and answers go as lines", param_hint="'--input'"
             )
-    if options.zero is not None and options.zero.kind == "air":
-        raise typer.BadParameter(
-            "not together with --zero air:LOG: nobody says when the motion begins", param_hint="'--input'"
-        )
+    check_without_air(options.zero)
     if options.rate is None:
         raise typer.BadParameter("needs --rate, the rate of the samples", param_hint="'--input'")
     return options.rate
@@ -177,21 +132,15 @@ def _check_outputs(options: Options) -> None:
     from tauhat.recordings.writing import log_ending
     from tauhat.report.page import require_libraries
 
-    inputs = [*_inputs(options), *(options.free or ()), *filter(None, [options.thresholds])]
+    inputs = [
+        *options.inputs, *(options.logs or ()), *(options.free or ()), *filter(None, [options.thresholds])
+    ]  # fmt: skip
     if options.output is not None:
         log_ending(options.output)
         check_output(options.output, inputs=inputs)
     if options.report is not None:
         require_libraries()
         check_output(options.report, inputs=[*inputs, *filter(None, [options.output])])
-
-
-def _inputs(options: Options) -> tuple[Path, ...]:
-    """Return the files that are read, beside those of `--free` and `--thresholds`."""
-    passed = options.zero.log if options.zero is not None else None
-    return (
-        options.estimate, *(options.logs or ()), *filter(None, [options.map_file, options.tool, passed]),
-    )  # fmt: skip
 
 
 def _logs(options: Options) -> list[Log]:
@@ -214,8 +163,7 @@ def _judged(known: Prepared, log: Log, rate: float, options: Options) -> JudgedL
     from tauhat.sensing.judged_log import judged_log
 
     sensor = known.sensor if known.sensor.rate == rate else replace(known.sensor, rate=rate)
-    standing = options.zero is not None and options.zero.kind == "standing"
-    return judged_log(sensor, log, known.thresholds, zero="standing" if standing else "as sensed", air=known.air)
+    return judged_log(sensor, log, known.thresholds, zero=_zero(options).told, air=known.air)
 
 
 def _write(judged: Sequence[JudgedLog], logs: Sequence[Log], options: Options) -> None:
@@ -241,7 +189,7 @@ def _document(judged: Sequence[JudgedLog], known: Prepared, options: Options) ->
         "observer": options.observer,
         "frame": sensed[0].frame,
         "axes": sensed[0].axes,
-        "zero": (options.zero or ZeroChoice()).kind,
+        "zero": _zero(options).kind,
         "error": {"from": known.source, "rms": known.sensor.model.rms.tolist()},
         "promised": known.thresholds.promised,
         "output": str(options.output) if options.output else None,

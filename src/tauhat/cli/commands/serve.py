@@ -10,24 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tauhat.cli.broken_pipes import outliving_readers
 from tauhat.cli.current_options import ConstantsOption, currents_of
-from tauhat.cli.options import EstimateArgument, JsonOption, MapOption, frequency
-from tauhat.cli.output import show, unbroken
+from tauhat.cli.options import JsonOption, frequency
+from tauhat.cli.output import counted, show, unbroken
 from tauhat.cli.reporting import say, working
-from tauhat.cli.sensing_options import (
-    AlarmsOption,
-    AxesOption,
-    CutoffOption,
-    DirectionsOption,
-    FrameOption,
-    FreeOption,
-    GainOption,
-    ObserverOption,
-    StampsOption,
-    ThresholdsOption,
-    ToolOption,
-)
+from tauhat.cli.sensing_options import SensingOptions
+from tauhat.cli.zero_choice import ZeroChoice, check_without_air
 
 if TYPE_CHECKING:
     from tauhat.cli.contact_choice import Prepared
@@ -40,10 +28,9 @@ _WEBSOCKET = 8765
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
+class Options(SensingOptions):
     """What `tauhat serve` takes."""
 
-    estimate: EstimateArgument
     rate: Annotated[
         float | None,
         typer.Option(
@@ -95,38 +82,39 @@ class Options:
         int, typer.Option("--page", metavar="PORT", min=0, max=65535, help="Of the page in the browser.")
     ] = 8080
     no_page: Annotated[bool, typer.Option("--no-page", help="Serve without a page.")] = False
-    observer: ObserverOption = "momentum"
-    gain: GainOption = None
-    cutoff: CutoffOption = None
-    frame: FrameOption = None
-    directions: DirectionsOption = "wrench"
-    axes: AxesOption = "base"
-    tool: ToolOption = None
-    stamps: StampsOption = "auto"
-    free: FreeOption = None
-    thresholds: ThresholdsOption = None
-    alarms: AlarmsOption = None
-    map_file: MapOption = None
+    realtime: Annotated[
+        bool, typer.Option("--realtime", help="Samples go before all ordinary programs; needs the right to (Linux).")
+    ] = False
     as_json: JsonOption = False
 
 
-@outliving_readers()
 def run(options: Options) -> None:
     """Answer the samples of running robots with what touches them, and show it in the browser, until interrupted."""
+    from tauhat.cli.contact_choice import prepared
+    from tauhat.cli.sensor_choice import sensor_of
     from tauhat.live.feed import Feed
     from tauhat.live.limits import Limits
+    from tauhat.live.priority import take_realtime_priority
     from tauhat.live.server import serve
     from tauhat.live.service import Service
 
+    check_without_air(options.zero)
+    if options.map_file is not None and options.robot is None and not options.free:
+        raise typer.BadParameter("needs --robot or --free, whose columns it explains", param_hint="'--map'")
     source = _source(options)
     channels = _channels(options, source)
     with working("preparing"):
         rate = _rate(options, source)
-        known = _prepared(options, rate)
+        known = prepared(options, sensor_of(options, rate))
         page = None if options.no_page else _page(known, channels.access, options.page)
     limits = Limits(clients=options.clients)
-    service = Service(sensor=known.sensor, thresholds=known.thresholds, limits=limits, feed=Feed(page))
+    service = Service(
+        sensor=known.sensor, thresholds=known.thresholds, limits=limits, feed=Feed(page),
+        zero=(options.zero or ZeroChoice()).told,
+    )  # fmt: skip
     robot = known.sensor.model.robot.name
+    if options.realtime:
+        take_realtime_priority()  # after the page's process has begun, which does not take it over
 
     def started(addresses: Mapping[str, str]) -> None:
         document = {"robot": robot, "rate": rate, **addresses}
@@ -135,10 +123,7 @@ def run(options: Options) -> None:
         sys.stdout.flush()
 
     totals = serve(service, channels, started=started)
-    say(
-        "done",
-        ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in totals.items() if count) or "nobody came",
-    )
+    say("done", counted({name.replace("_", " "): count for name, count in totals.items()}, none="nobody came"))
 
 
 def _source(options: Options) -> UniversalRobot | None:
@@ -157,11 +142,17 @@ def _source(options: Options) -> UniversalRobot | None:
 
 def _rate(options: Options, source: UniversalRobot | None) -> float:
     """Return the rate of the samples; a robot is asked whether it has it, before anything takes time."""
+    from tauhat.live.limits import Limits
+
     if source is not None:
         fastest = source.greeted().fastest
         return fastest if options.rate is None else options.rate
     if options.rate is None:
         raise typer.BadParameter("needed without --robot: the rate of the samples", param_hint="'--rate'")
+    if options.rate > (most := Limits().messages):
+        raise typer.BadParameter(
+            f"a client may send {most:g} samples a second, not {options.rate:g}", param_hint="'--rate'"
+        )
     return options.rate
 
 
@@ -174,23 +165,6 @@ def _channels(options: Options, source: UniversalRobot | None) -> Channels:
     websocket = _WEBSOCKET if options.websocket is None and alone else options.websocket
     access = Access(host=options.host, token=token)
     return Channels(websocket=websocket, udp=options.udp, pipe=options.pipe, robot=source, access=access)
-
-
-def _prepared(options: Options, rate: float) -> Prepared:
-    """Return sensor and thresholds, as `tauhat sense` makes them."""
-    from tauhat.cli.contact_choice import ContactChoice
-    from tauhat.cli.sensor_choice import SensorChoice
-
-    choice = SensorChoice(
-        estimate=options.estimate, observer=options.observer, gain=options.gain, cutoff=options.cutoff,
-        frame=options.frame, directions=options.directions, axes=options.axes, tool=options.tool,
-        stamps=options.stamps,
-    )  # fmt: skip
-    contacts = ContactChoice(
-        free=tuple(options.free or ()), thresholds=options.thresholds, alarms=options.alarms,
-        map_file=options.map_file, inputs=tuple(filter(None, [options.estimate, options.map_file, options.tool])),
-    )  # fmt: skip
-    return contacts.prepared(choice.sensor(rate))
 
 
 def _page(known: Prepared, access: Access, port: int) -> Page:

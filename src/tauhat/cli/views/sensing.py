@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from tauhat.cli.output import counted
 from tauhat.cli.views.tables import aligned, table
 
 if TYPE_CHECKING:
@@ -68,10 +69,9 @@ def _sentence(judged: JudgedLog) -> RenderableType:
     log = judged.sensed
     counts, untold = log.counts, "behind starts or off the pass in air" if judged.air else "behind starts"
     skipped = {"late": counts.late, "repeated": counts.repeated, "not finite": counts.not_finite}
-    said = ", ".join(f"{count} {name}" for name, count in skipped.items() if count) or "none"
     frozen = f" Frozen, as of a controller that hangs: {counts.frozen}." if counts.frozen else ""
     return Text(
-        f"{log.n_t} samples at {1.0 / log.step:.6g} Hz; skipped: {said}; started again {counts.restarts} times."
-        f"{frozen}\n"
+        f"{log.n_t} samples at {1.0 / log.step:.6g} Hz; skipped: {counted(skipped)}; "
+        f"started again {counts.restarts} times.{frozen}\n"
         f"± is one standard error. {log.n_t - int(log.settled.sum())} samples {untold} are not in the tables.\n"
     )
