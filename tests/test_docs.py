@@ -64,7 +64,7 @@ def stock(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "tauhat-demo").mkdir()
     for seed, name in enumerate(("identification", "verification")):
         log = folder / "tauhat-demo" / f"{name}.parquet"
-        made(folder, "simulate", "ur5e", "-o", log, "--seconds", 6, "--rate", 250, "--spread", 0, "--seed", seed)
+        made(folder, "simulate", "ur5e", "-o", log, "--seconds", 6, "--rate", 500, "--spread", 0, "--seed", seed)
         write_for_the_readme(log, folder / f"run_{seed + 1}.csv")
     made(folder, "simulate", "two_link", "-o", "run.csv", "--seconds", 4, "--rate", 250)
     made(folder, "identify", "two_link", "run.csv", "-o", "estimate.json")

@@ -291,7 +291,10 @@ def test_a_push_and_nothing_at_all_are_no_payload():
     nothing = rng.normal(scale=0.2, size=Q.shape)
     push = nothing.copy()
     push[400:600] += np.array([SOLVER.jacobian(place)[0][:3].T @ [20.0, 15.0, 0.0] for place in Q[400:600]])
-    assert check_payload(with_robot(Q, nothing), SOLVER).verdict == "no payload"
+    found = check_payload(with_robot(Q, nothing), SOLVER)
+    assert found.verdict == "no payload"
+    assert found.mass < 3.0 * found.mass_std
+    assert np.isnan(found.centre).all(), "no mass has no centre"
     assert check_payload(with_robot(Q, push), SOLVER).verdict == "no payload"
     held = np.repeat(Q[:1], 600, axis=0)
     assert check_payload(with_robot(held, weight(held, 1.5, (0.0, 0.0, 0.1))), SOLVER).verdict == "undecided"

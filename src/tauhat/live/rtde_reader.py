@@ -104,5 +104,4 @@ def _write(pipe: int, cycle: bytes) -> None:
 
 
 if __name__ == "__main__":
-    # at once: the library would wait for seconds for a controller that is silent, and nothing is left to be written
-    os._exit(main(sys.argv[1], float(sys.argv[2]), float(sys.argv[3])))
+    sys.exit(main(sys.argv[1], float(sys.argv[2]), float(sys.argv[3])))

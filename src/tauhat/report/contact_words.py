@@ -15,12 +15,12 @@ _PERCENT = 100.0
 
 
 def kind_of(event: ContactEvent) -> str:
-    """Return what an event is: a contact, a body that is carried, either; nothing where it was too short to tell."""
+    """Return what an event is: no payload, a body that is carried, either; nothing where it was too short to tell."""
     found = event.payload
     if found is None:
         return ""
     if found.verdict == "no payload":
-        return "contact"
+        return found.verdict
     return f"{'carries' if found.verdict == 'payload' else 'push, or'} {found.mass:.2f} kg"
 
 

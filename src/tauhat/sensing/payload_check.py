@@ -34,7 +34,7 @@ class PayloadCheck:
 
     verdict : no payload where a mass leaves half unexplained; undecided where it fits and the arm hardly moved
     mass, mass_std : [kg]; the error as large as what is left unexplained says
-    centre : (3,) from the frame, in its axes [m]; meant where the mass is sure
+    centre : (3,) from the frame, in its axes [m]; NaN where no mass is sure
     unexplained : share of the squared torque that the mass leaves, on the samples it was not fitted to
     """
 
@@ -87,9 +87,10 @@ def check_payload(
     unexplained = _left(columns, torque, halves)
     values, errors = _fitted(columns, torque)
     mass, mass_std = float(values[0]), float(errors[0])
-    centre = values[1:] / mass if mass else np.full(3, np.nan)
+    is_heavy = mass > _SURE * mass_std
+    centre = values[1:] / mass if is_heavy else np.full(3, np.nan)
     return PayloadCheck(
-        verdict=_verdict(columns, mass > _SURE * mass_std and unexplained < _LEFT), mass=mass, mass_std=mass_std,
+        verdict=_verdict(columns, is_heavy and unexplained < _LEFT), mass=mass, mass_std=mass_std,
         centre=centre, unexplained=unexplained,
     )  # fmt: skip
 
