@@ -13,12 +13,12 @@ from tauhat.excitation.fourier import random_fourier
 from tauhat.excitation.repeated import Repeated
 from tauhat.robots import forward_kinematics, load_robot
 from tauhat.sensing import force_sensor
-from tauhat.simulation.contact import TIP, start_cell
+from tauhat.simulation.contact import TIP, RunningCell, in_the_air, start_cell
 from tauhat.studies.polishing import PolishingStudy, chapters, polishing_study, shift
 from tauhat.studies.polishing.arm import Arm, ArmSettings, Scene
 from tauhat.studies.polishing.calibration import STEADY, CalibrationSettings
 from tauhat.studies.polishing.findings import Findings, finished, spread
-from tauhat.studies.polishing.job import JobLog
+from tauhat.studies.polishing.job import Job, JobLog
 from tauhat.studies.polishing.readers import LoadCellReading, ToolFriction, along_the_normal, of_three_forces
 from tauhat.studies.polishing.sensing_ways import LOAD_CELL, NO_WARMTH, reading_of
 from tauhat.studies.polishing.shift import ShiftSettings
@@ -194,13 +194,43 @@ def test_a_break_comes_in_the_middle_of_the_shift():
     usual = ShiftSettings()
     assert len(usual.times) == 17
     assert [hour for hour in usual.times if usual.rests(hour)] == [2.0, 2.25]
+    assert [hour for hour in usual.times if usual.passes(hour)] == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert all(map(replace(usual, anew=60.0).passes, usual.times))
+
+
+def test_the_arm_comes_back_gently_from_where_a_job_was_given_up(arm, models, monkeypatch):
+    scene = Scene(0, "flat", "cold")
+    job = arm.job(scene)
+    ended = JobLog(*(np.array([value]) for value in (9.0, 0.013, -0.004, 0.0, 0.0, 0.0, 1.0)), "stopped", "force_limit")
+    cell = in_the_air(arm.cell(scene, models.warm))
+    running = start_cell(cell, job.path.at(0.013, 0.0, -0.004, 0.0)[0], rng=arm.rng_of_run(scene))
+    passed, advance = [running.reference], RunningCell.advance
+    monkeypatch.setattr(RunningCell, "advance", lambda self, q, dq: passed.append(q) or advance(self, q, dq))
+    job.come_back(running, ended)
+    np.testing.assert_allclose(running.reference, job.beginning, atol=1e-6)
+    farthest = np.abs(passed[0] - job.beginning).max()
+    assert farthest > 0.01
+    assert np.abs(np.diff(passed, axis=0)).max() < 0.05 * farthest, "no jump"
+    moved = len(passed)
+    job.come_back(running, ended._replace(s=np.array([-0.02]), depth=np.array([-job.polisher.limits.height])))
+    assert len(passed) == moved, "it is there already"
 
 
 def test_joints_warm_up_over_a_shift_and_cool_in_the_break(arm, models, monkeypatch):
-    monkeypatch.setattr(shift, "SHOWN", (LOAD_CELL,))
+    monkeypatch.setattr(shift, "SHOWN", {LOAD_CELL: shift.SHOWN[LOAD_CELL]._replace(anew=True)})
     monkeypatch.setattr(Arm, "calibrated", lambda _: models)  # a load cell needs none
-    hours = ShiftSettings(hours=0.75, every=900.0, rest=(0.25, 0.5))
+    passes: list[float] = []
+    begun: list[float] = []
+
+    def noted(moments, act):
+        return lambda job, cell, *reader: moments.append(cell.time) or act(job, cell, *reader)
+
+    monkeypatch.setattr(Job, "in_air", noted(passes, Job.in_air))
+    monkeypatch.setattr(Job, "done_in", noted(begun, Job.done_in))
+    hours = ShiftSettings(hours=0.75, every=900.0, rest=(0.25, 0.5), anew=1800.0)
     done = shift.shift_of(shift.ShiftTrial(settings=SMALL, shift=hours, seed=0, motion=arm.motion))
+    assert passes == pytest.approx([0.0, 0.0, 1800.0], abs=1e-6), "that of the beginning, and two taken anew"
+    assert begun[1::2] == pytest.approx([900.0, 2700.0], abs=1e-6)
     assert [worked.hour for worked in done] == [0.0, 0.25, 0.5, 0.75]
     assert all(worked.outcome.phase == "done" for worked in done)
     cold, worked, rested, again = (job.temperature for job in done)

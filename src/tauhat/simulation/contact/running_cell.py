@@ -95,6 +95,11 @@ class RunningCell:
         return self._sample
 
     @property
+    def time(self) -> float:
+        """The cell's own clock, with rests and work passed in one step [s]; sensors may stamp later."""
+        return self._passed
+
+    @property
     def reference(self) -> FloatArray:
         """The last reference position, (n_v,) [rad or m]; before the first `advance`, the start pose."""
         return np.array(self._guide[c.TO_Q])

@@ -289,7 +289,7 @@ def shift_chapter(done: Sequence[Worked], hours: float) -> Chapter:
         title=f"Over {hours:g} h",
         header=("reading", "RMS [%]", "worst [%]", "bias [%]", "quartiles of bias apart [%]", "done"),
         rows=tuple(rows),
-        note="The pass in air is that of the cold beginning.",
+        note="A pass in air is that of the cold beginning where it is not taken anew.",
     )
     text = (
         (

@@ -17,6 +17,7 @@ from tauhat.simulation.contact.running_cell import CellSample, RunningCell
 from tauhat.studies.polishing.readers import ForceReader, Place
 
 _LONGEST = 120.0  # [s] of a job; one that lasts longer is given up
+_PEAK = 1.875  # largest over mean speed of a way with the least jerk
 
 
 class AirLog(NamedTuple):
@@ -93,6 +94,16 @@ class Job:
         t, q, tau = (np.array([getattr(sample, name) for sample in samples]) for name in ("t", "q", "tau"))
         log = Recording(t=t, q=q, tau=tau, joint_names=self.path.robot.joint_names, name="in air")
         return AirLog(log, np.cumsum(speeds) * self.polisher.period)
+
+    def come_back(self, cell: RunningCell, log: JobLog) -> None:
+        """Move above the surface from where a job ended to where the next one begins, gently."""
+        task, s, depth = self.polisher.task, float(log.s[-1]), float(log.depth[-1])
+        way, rise = -task.half - s, -self.polisher.limits.height - depth
+        seconds = _PEAK * max(abs(way), abs(rise)) / self.way_in
+        for k in range(1, int(seconds / self.polisher.period) + 1):
+            x = k * self.polisher.period / seconds
+            part, speed = x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * (x * (1.0 - x)) ** 2 / seconds
+            cell.advance(*self.path.at(s + part * way, speed * way, depth + part * rise, speed * rise))
 
     def _step(self, cell: RunningCell, reader: ForceReader, now: tuple[Any, Any, Any, float]) -> tuple[Any, ...]:
         """Return what is remembered one period later, and a row of the log."""
