@@ -3,6 +3,7 @@
     tauhat serve estimate.json --rate 250                          # in one terminal; prints its addresses
     python examples/live/replay.py ws://127.0.0.1:8765/ log.csv    # in another
 
+The log's rate must be the server's. What its columns mean says the map beside it, `log.map.toml`, or `--map`.
 The address may be that of any channel: `ws://host:port/`, `udp://host:port` or `unix:path`. A program that reads a
 robot does the same with `sender.send(t, q, tau)` for every sample and `sender.answers()` for what has come back.
 """
@@ -27,10 +28,11 @@ def main() -> None:
     parser.add_argument(
         "--speed", type=float, default=1.0, help="times as fast as recorded; inf for as fast as it goes"
     )
+    parser.add_argument("--map", type=Path, help="what the log's columns mean; else log.map.toml beside it")
     parser.add_argument("--token-file", type=Path)
     options = parser.parse_args()
     token = None if options.token_file is None else read_token(options.token_file)
-    log, answered, largest = read_recording(options.log), 0, 0.0
+    log, answered, largest = read_recording(options.log, map=options.map), 0, 0.0
     with Sender(options.address, token=token) as sender:
         for answer in sender.replay(log, speed=options.speed):
             answered += 1

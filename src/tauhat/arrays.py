@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import fields
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tauhat.errors import ArrayError
+from tauhat.errors import ArrayError, TauhatError
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.intp]
@@ -45,6 +46,33 @@ def _numeric(name: str, value: object, where: str) -> FloatArray:
         return np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise ArrayError(f"{name} is not an array of numbers", where=where, got=type(value).__name__) from error
+
+
+def check_fields(
+    settings: Any, *, error: type[TauhatError], name: str, or_zero: Collection[str] = (), signed: Collection[str] = ()
+) -> None:
+    """Pass where every field of a dataclass is a finite number above zero.
+
+    Parameters
+    ----------
+    error : raised where one is not
+    name : how messages call the settings
+    or_zero, signed : fields that may also be zero, or any finite number
+
+    Raises
+    ------
+    TauhatError
+        the given one, for the first field that is not.
+    """
+    for field in fields(settings):
+        value = getattr(settings, field.name)
+        least, wanted = 0.0, "a finite number above zero"
+        if field.name in signed:
+            least, wanted = -np.inf, "a finite number"
+        elif field.name in or_zero:
+            wanted = "a finite number, not negative"
+        if not (np.isfinite(value) and (value > least or (value == 0.0 and field.name in or_zero))):
+            raise error(f"{name}, {field.name}", expected=wanted, got=value)
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

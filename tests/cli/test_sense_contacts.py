@@ -64,7 +64,7 @@ def test_thresholds_learnt_on_a_free_log_find_the_push_and_nothing_else(bench: B
 def test_a_rate_that_the_free_motion_supports_is_told(bench: Bench) -> None:
     words = ("sense", bench.estimate, bench.pushed, "--free", bench.free)
     assert "thresholds allow 4000 false ones an hour" in line(made(*words, "--alarms", "4000").stdout)
-    assert "were asked for" in line(made(*words).stdout)
+    assert "asked for: 1" in line(made(*words).stdout)
 
 
 def test_without_free_motion_a_strong_push_is_found_and_the_doubt_told(bench: Bench) -> None:
@@ -89,7 +89,8 @@ def test_samples_through_a_pipe_are_told_when_a_contact_begins_and_ends(bench: B
         touched = [answer["t"] for answer in found if answer["contact"]]
         assert (touched[0], touched[-1]) == (event["start"], event["end"])
         assert max(answer["excess"] for answer in found) == pytest.approx(event["excess"], rel=1e-3)
-        assert {answer["link"] for answer in found if not answer["contact"]} == {None}
+        assert {answer["link"] for answer in found if not answer["contact"] and "event" not in answer} == {None}
+        assert [answer["link"] for answer in found if answer.get("event") == "end"] == [event["link"]]
     assert not any(answer["contact"] for answer in answers(bench, bench.free, "--thresholds", str(limits)))
 
 

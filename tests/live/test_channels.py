@@ -82,6 +82,20 @@ def test_every_sample_is_answered_once_in_order_with_what_the_log_would_tell(ser
 
 
 @pytest.mark.parametrize("channel", CHANNELS)
+def test_the_greeting_does_not_end_the_wait_for_an_answer(served: Running, channel: str):
+    with Sender(served.addresses[channel]) as sender:
+        sender.send(LOG.t[0], LOG.q[0].tolist(), LOG.tau[0].tolist())
+        assert [answer["t"] for answer in sender.answers(10.0)] == [0.0]
+        assert sender.hello["hello"] == "tauhat"
+        begin = time.monotonic()
+        assert sender.answers(0.3) == []
+        assert time.monotonic() - begin >= 0.29
+        sender.command("counts")
+        assert sender.answers(10.0) == []
+        assert sender.notices[-1]["notice"] == "counts"
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
 def test_garbage_among_the_samples_is_counted_and_answers_nothing(served: Running, channel: str):
     garbage = ["{", "[]", "null", '{"t": 1}', '{"t": "x", "q": [], "tau": []}', '{"command": "stop"}', "\ufffd" * 9]
     connection = connect(served.addresses[channel])
@@ -249,6 +263,7 @@ def test_there_are_so_many_clients_and_no_more_over_all_channels(tmp_path: Path)
         for channel in CHANNELS:
             with Sender(served.addresses[channel]) as third, pytest.raises(LiveError, match="too many clients"):
                 list(third.replay(LOG, speed=FAST))
+        assert (served.server.clients.totals["clients"], served.server.clients.totals["turned_away"]) == (2, 2)
         first.close()
         wait_until(lambda: len(served.server.clients) == 1)
         assert served.serves("udp")

@@ -20,6 +20,7 @@ from tauhat.live.access import Access
 from tauhat.live.feed import Snapshot
 from tauhat.live.page_process import PageProcess, _deaf_to_interrupts, start_page
 from tauhat.robots import load_robot
+from tauhat.sensing.touch import Touch
 
 pytest.importorskip("viser", reason="viser is not installed: there is no page")
 
@@ -28,7 +29,9 @@ Z_FORCE = "[...document.querySelectorAll('tr')].find(row => row.innerText.starts
 SETTLED = 0.02  # [s] between snapshots of the tests
 
 
-def snapshot(t: float, *, force: float, contact: str = "", spread: float = 1.0, stream: str = "arm") -> Snapshot:
+def snapshot(
+    t: float, *, force: float, contact: Touch | None = None, spread: float = 1.0, stream: str = "arm"
+) -> Snapshot:
     covariance = np.diag([1.0, 1.0, spread**2, 0.1, 0.1, 0.1])
     return Snapshot(
         stream=stream, t=t, q=np.array([0.3, 0.4, 0.0, -1.9, 0.0, 2.2, 0.5]), tau=np.arange(7.0), tau_std=np.ones(7),
@@ -97,7 +100,8 @@ def test_pressing_zero_arrives_in_the_server(page, tab):
 
 
 def test_contacts_and_doubts_are_said(page, tab):
-    touched = snapshot(200.0, force=42.0, contact="<img src=x onerror=alert(1)>link6")
+    touch = Touch(1, "<img src=x onerror=alert(1)>link6", 199.0, 200.0, 42.0, open=True)
+    touched = snapshot(200.0, force=42.0, contact=touch)
     script = "document.body.innerText.includes('onerror=alert(1)>link6') && document.body.innerText.includes('42.0')"
     shown(page, tab, script, touched)
     assert tab.evaluate("document.querySelectorAll('img[src=x]').length") == 0
@@ -105,12 +109,12 @@ def test_contacts_and_doubts_are_said(page, tab):
         page,
         tab,
         "document.body.innerText.includes('ended') && !document.body.innerText.includes('goes on')",
-        snapshot(240.0, force=0.0),
+        snapshot(240.0, force=0.0, contact=touch._replace(open=False)),
     )
     shown(
         page,
         tab,
-        "document.body.innerText.includes('error bar too wide: ± 839 N along z')",
+        "document.body.innerText.includes('error bar too wide: ± 588 N along z')",
         snapshot(260.0, force=0.0, spread=300.0),
     )
 
@@ -118,6 +122,16 @@ def test_contacts_and_doubts_are_said(page, tab):
 def test_a_stream_that_ends_is_called_silent(page, tab):
     shown(page, tab, "document.querySelector('[data-state=live]') !== null", snapshot(300.0, force=1.0))
     assert "silent for" in tab.until("document.querySelector('[data-state=silent]')?.innerText")
+
+
+def test_a_client_that_leaves_ends_its_stream_and_its_contact(page, tab):
+    touch = Touch(2, "link5", 320.0, 320.0, 9.0, open=True)
+    shown(page, tab, "document.body.innerText.includes('goes on')", snapshot(320.0, force=9.0, contact=touch))
+    page.end("nobody")
+    page.end("arm")
+    assert "the stream has ended" in tab.until("document.querySelector('[data-state=ended]')?.innerText")
+    tab.until("!document.body.innerText.includes('goes on')")
+    shown(page, tab, "document.querySelector('[data-state=live]') !== null", snapshot(1.0, force=1.0, stream="again"))
 
 
 def test_the_page_loads_nothing_that_its_headers_forbid(tab):
@@ -154,6 +168,7 @@ def test_a_page_that_died_is_no_error(tmp_path):
         page._process.join(timeout=10.0)
         assert not page.is_alive
         assert not page.send(snapshot(1.0, force=1.0))
+        page.end("arm")
         assert page.commands() == []
 
 
@@ -169,6 +184,7 @@ PARENT = """
 import time
 from tauhat.live.page_process import start_page
 from tauhat.robots import load_robot
+from tauhat.sensing.touch import Touch
 if __name__ == "__main__":
     page = start_page(load_robot("two_link"), port=0)
     print(page._process.pid, flush=True)
@@ -194,6 +210,7 @@ def test_the_page_dies_with_its_server(tmp_path):
 QUIET = """
 from tauhat.live.page_process import start_page
 from tauhat.robots import load_robot
+from tauhat.sensing.touch import Touch
 if __name__ == "__main__":
     page = start_page(load_robot("two_link"), port=0)
     print("said", flush=True)

@@ -15,6 +15,7 @@ import pytest
 from tauhat.errors import MissingExtraError
 from tauhat.live.feed import Snapshot
 from tauhat.robots import Robot, forward_kinematics, load_robot
+from tauhat.sensing.touch import Touch
 
 pytest.importorskip("viser", reason="viser is not installed: there is no page")
 pytestmark = pytest.mark.filterwarnings("default")
@@ -47,7 +48,7 @@ def server(tmp_path: Path) -> Iterator[Any]:
 def reading(robot: Robot, q: np.ndarray, force: np.ndarray, covariance: np.ndarray, **more: Any) -> Snapshot:
     whole = np.zeros((6, 6))
     whole[:3, :3] = covariance
-    values = {"stream": "arm", "t": 0.0, "contact": "", "counts": {}} | more
+    values = {"stream": "arm", "t": 0.0, "contact": None, "counts": {}} | more
     return Snapshot(
         q=q,
         tau=np.zeros(robot.n_v),
@@ -180,6 +181,29 @@ def test_a_stream_that_is_chosen_is_drawn_though_it_says_nothing_any_more(server
     monkeypatch.setattr(server, "get_clients", lambda: {0: None})
     page.refresh()
     assert (np.array(page._scene._arrow.points) == drawn["first"]).all()
+
+
+def test_a_stream_that_has_ended_shows_no_force_also_when_it_is_chosen_again(server, monkeypatch):
+    from tauhat.report.live_page import LivePage
+
+    robot = load_robot("two_link")
+    page = LivePage(server, robot, clock=iter(np.arange(99.0)).__next__)
+    touch = Touch(1, "joint2", 0.0, 0.0, 9.0, open=True)
+    page.show(reading(robot, np.zeros(2), np.array([9.0, 0.0, 0.0]), np.eye(3), stream="first", contact=touch))
+    scene = page._scene
+    assert scene._arrow.visible
+    page.end("first")
+    assert (scene._arrow.visible, scene._error.visible) == (False, False)
+    assert not page._streams["first"].contacts.contacts[0].open
+    page.show(reading(robot, np.zeros(2), np.array([9.0, 0.0, 0.0]), np.eye(3), stream="second"))
+    assert page._choice.value == "second"
+    assert scene._arrow.visible
+    page._choice.value = "first"
+    monkeypatch.setattr(server, "get_clients", lambda: {0: None})
+    page.refresh()
+    assert (scene._arrow.visible, scene._error.visible) == (False, False)
+    assert "the stream has ended" in page._status.content
+    assert "Arrow" not in page._notes.content
 
 
 def test_without_viser_the_extra_is_named(tmp_path, monkeypatch):

@@ -18,9 +18,10 @@ from live_server import TOKEN, running
 from typer.testing import CliRunner, Result
 
 from tauhat.cli.app import app
+from tauhat.cli.commands.serve import _called
 from tauhat.estimation import load_estimate
 from tauhat.live import Sender, Service
-from tauhat.recordings import read_recording
+from tauhat.recordings import read_recording, write_columns
 from tauhat.sensing import force_sensor
 
 RATE = 250
@@ -67,6 +68,19 @@ def test_samples_are_answered_until_sigterm_and_nothing_is_left_behind(folder: P
     assert document["robot"] == "two_link"
 
 
+@pytest.mark.parametrize(
+    ("name", "count", "words"),
+    [
+        ("clients", 1, "client"),
+        ("clients", 2, "clients"),
+        ("restarts", 1, "restart"),
+        ("turned_away", 1, "turned away"),
+    ],
+)
+def test_one_is_told_in_the_singular(name: str, count: int, words: str):
+    assert _called(name, count) == words
+
+
 def test_a_client_that_leaves_without_reading_ends_nothing(folder: Path):
     """Its answers are written to a socket that nobody reads: a reader of standard output that leaves ends a program."""
     words = ["serve", folder / "estimate.json", "--rate", RATE, "--pipe", folder / "left", "--no-page", "--json"]
@@ -89,13 +103,21 @@ def test_a_client_that_leaves_without_reading_ends_nothing(folder: Path):
 
 
 def test_the_example_replays_a_log(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    log = read_recording(folder / "log.parquet")
+    columns = {"clock": log.t} | {f"{name}{j}": getattr(log, name)[:, j] for name in ("q", "tau") for j in (0, 1)}
+    write_columns(columns, folder / "other.csv")
+    (folder / "names.toml").write_text(
+        '[time]\ncolumn = "clock"\n[position]\ncolumns = "q{0..1}"\n[torque]\ncolumns = "tau{0..1}"\n'
+    )
     service = Service(sensor=force_sensor(load_estimate(folder / "estimate.json"), rate=RATE))
     with running(folder, service=service) as served:
-        words = [served.addresses["udp"], str(folder / "log.parquet"), "--speed", "inf"]
-        monkeypatch.setattr(sys, "argv", ["replay.py", *words])
-        runpy.run_path(str(ROOT / "examples" / "live" / "replay.py"), run_name="__main__")
-    n_t = read_recording(folder / "log.parquet").n_t
-    assert capsys.readouterr().out.startswith(f"{n_t} of {n_t} samples answered, largest force ")
+        for name, *more in (["log.parquet"], ["other.csv", "--map", str(folder / "names.toml")]):
+            words = [served.addresses["udp"], str(folder / name), "--speed", "inf", *more]
+            monkeypatch.setattr(sys, "argv", ["replay.py", *words])
+            runpy.run_path(str(ROOT / "examples" / "live" / "replay.py"), run_name="__main__")
+    log_line, other_line = capsys.readouterr().out.splitlines()
+    assert log_line.startswith(f"{log.n_t} of {log.n_t} samples answered, largest force ")
+    assert other_line == log_line
 
 
 def test_other_machines_are_not_let_in_without_a_token(folder: Path):

@@ -45,6 +45,8 @@ class Page:
     url = "http://127.0.0.1:1"
     def send(self, snapshot):
         shown.append(tuple(snapshot))
+    def end(self, stream):
+        pass
     def commands(self):
         return []
     def close(self):
@@ -116,7 +118,7 @@ def test_page_and_followers_get_what_the_sensor_finds_along_a_log_of_the_same_sa
             _, errors = process.communicate(timeout=15.0)
     assert process.returncode == 0, errors
     assert (document["rate"], document["source"]) == (RATE, f"ur://{stand_in.address}")
-    assert re.fullmatch(r"done: 2 clients, \d+ taken.*, [1-9] restarts.*\n", errors)
+    assert re.fullmatch(r"done: 2 clients, \d+ taken.*, [1-9] restarts?.*\n", errors)
     kept, shown = pickle.loads((tmp_path / "kept").read_bytes())  # noqa: S301
     wanted = along(kept, estimate)
     place = {t: row for row, t in enumerate(wanted.t.tolist())}
@@ -163,6 +165,60 @@ def test_a_client_follows_over_a_connection_however_silent_and_not_over_udp(tmp_
         answers, refused = served(channels, service, look)
     assert len(answers) >= 700  # 1.4 s
     assert refused == {"notice": "follow", "robot": None, "state": None}
+
+
+def test_a_followers_zero_is_the_robots_and_all_that_follow_are_told(tmp_path: Path):
+    """Who sends samples of its own zeroes these."""
+
+    def zeros(sender: Sender) -> list[Any]:
+        end = time.monotonic() + 10.0
+        while not (found := [one["tau_ext"] for one in sender.notices if one["notice"] == "zero"]):
+            assert time.monotonic() < end
+            sender.answers(0.5)
+        return found
+
+    def look(server: LiveServer) -> tuple[Any, ...]:
+        address = server.addresses["pipe"]
+        with Sender(address) as own, Sender(address) as asking, Sender(address) as beside:
+            own.command("zero")
+            assert zeros(own) == [None]
+            for sender in (own, asking, beside):
+                sender.command("follow")
+            before = gathered(asking, 400)[-1]["tau_ext"]
+            own.send(0.0, [0.0] * 6, [0.0] * 6)
+            own.command("zero")
+            still = [answer["tau_ext"] for answer in gathered(beside, 200)]
+            asking.command("zero")
+            return before, zeros(asking), zeros(beside), still, gathered(asking, 100)[60]["tau_ext"]
+
+    standing = {name: np.repeat(values[:1], len(values), axis=0) for name, values in PUSHED.items()}
+    with RtdeStandIn(standing | {"timestamp": PUSHED["timestamp"]}) as stand_in:
+        found = served(Channels(pipe=tmp_path / "s", robot=robot_at(stand_in)), Service(sensor=sensor(RATE)), look)
+    before, *told, still, after = found
+    assert np.abs(before).max() > 2.0
+    np.testing.assert_allclose(still[-1], before, rtol=0.05)
+    for zero in told:
+        (taken_off,) = zero
+        np.testing.assert_allclose(taken_off, before, rtol=0.05)
+    assert np.abs(after).max() < 0.05 * np.abs(before).max()
+
+
+def test_the_example_of_the_page_about_live_follows_and_zeroes(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    page = (Path(__file__).parents[2] / "docs" / "live.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    example = next(text for text in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "def follow" in text)
+    exec(example, names)  # noqa: S102
+    assert "nobody answers" in capsys.readouterr().out
+
+    def look(server: LiveServer) -> None:
+        names["follow"](server.addresses["pipe"], 50)
+
+    with RtdeStandIn(PUSHED) as stand_in:
+        served(Channels(pipe=tmp_path / "s", robot=robot_at(stand_in)), Service(sensor=sensor(RATE)), look)
+    *answers, notices = capsys.readouterr().out.splitlines()
+    assert len(answers) >= 50
+    assert "'notice': 'follow'" in notices
+    assert "'notice': 'zero'" in notices
 
 
 def test_a_robot_that_stays_away_ends_the_server_with_its_error_and_followers_are_told(tmp_path: Path):

@@ -37,7 +37,11 @@ class Panel:
     def __init__(self) -> None:
         self.url = "http://127.0.0.1:1"
         self.shown: list[Snapshot] = []
+        self.ended: list[str] = []
         self.closed = False
+
+    def end(self, stream: str) -> None:
+        self.ended.append(stream)
 
     def send(self, snapshot: Snapshot) -> None:
         self.shown.append(snapshot)
@@ -69,8 +73,8 @@ def pushed_log() -> Recording:
 
 def test_contacts_of_a_stream_are_those_of_the_log():
     pushed = pushed_log()
-    outbox = Outbox(LOG.n_t)
-    session = Session(Service(sensor=SENSOR, thresholds=THRESHOLDS), name="one", outbox=outbox)
+    outbox, panel = Outbox(LOG.n_t), Panel()
+    session = Session(Service(sensor=SENSOR, thresholds=THRESHOLDS, feed=Feed(panel)), name="one", outbox=outbox)
     for t, q, tau in zip(pushed.t.tolist(), pushed.q.tolist(), pushed.tau.tolist(), strict=True):
         session.receive(json.dumps({"t": t, "q": q, "tau": tau}).encode(), t)
     answers = emptied(outbox)
@@ -79,6 +83,14 @@ def test_contacts_of_a_stream_are_those_of_the_log():
     starts = [answer["t"] for answer in answers if answer.get("event") == "start"]
     assert starts == [event.start for event in found.events]
     assert any(0.7 <= start <= 0.9 for start in starts)
+    over = [event for event in found.events if not event.open]
+    assert [answer["link"] for answer in answers if answer.get("event") == "end"] == [event.link for event in over]
+    assert len({answer["link"] for answer in answers if answer["contact"]}) > len(over)  # links change meanwhile
+    shown = {touch.number: touch for touch in (snapshot.contact for snapshot in panel.shown) if touch is not None}
+    told = {touch.number: found.events[touch.number - 1] for touch in shown.values() if not touch.open}
+    assert told
+    for number, event in told.items():
+        assert (shown[number].link, shown[number].start, shown[number].end) == (event.link, event.start, event.end)
 
 
 def test_zero_is_what_zeroing_the_log_by_it_gives():
@@ -148,6 +160,19 @@ def test_a_controller_that_hangs_is_told_once_a_second_and_shown_on_the_page():
     assert panel.shown[0].counts["frozen"] == 0
     assert panel.shown[-1].counts["frozen"] > 1900
     assert "12 frozen" in counts_html({"frozen": 12})
+
+
+def test_a_zero_without_samples_says_that_nothing_was_zeroed():
+    outbox = Outbox(9)
+    session = Session(SERVICE, name="one", outbox=outbox, followers=Followers())
+    session.receive(b'{"command": "zero"}', 0.0)
+    (notice,) = emptied(outbox)
+    assert (notice["notice"], notice["tau_ext"]) == ("zero", None)
+    assert "no samples" in notice["why"]
+    assert not session.command("zero")
+    session.receive(MESSAGES[0].encode(), 0.0)
+    assert session.command("zero")
+    assert len(emptied(outbox)[-1]["tau_ext"]) == 7
 
 
 def test_a_session_without_a_robot_to_follow_says_so():
@@ -261,8 +286,10 @@ def test_the_page_is_shown_the_newest_thirty_times_a_second_by_turns():
     np.testing.assert_allclose(last.wrench, sensed.wrench[row])
     np.testing.assert_allclose(np.sqrt(np.diagonal(last.covariance)), sensed.wrench_std[row])
     assert last.counts["taken"] == row + 1
-    assert isinstance(last.contact, str)
     feed.forget("two")
+    feed.forget("two")
+    feed.forget("never shown")
+    assert panel.ended == ["two"]
     assert feed.commands() == ["zero"]
     feed.close()
     assert panel.closed
@@ -271,5 +298,6 @@ def test_the_page_is_shown_the_newest_thirty_times_a_second_by_turns():
 
 def test_limits_bound_something():
     for name in ("message", "messages", "clients", "idle"):
-        with pytest.raises(LiveError, match=name):
-            Limits(**{name: 0})
+        for value in (0, np.inf, np.nan):
+            with pytest.raises(LiveError, match=rf"limits of a server, {name}; expected a finite number above zero"):
+                Limits(**{name: value})

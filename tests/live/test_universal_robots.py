@@ -143,6 +143,17 @@ def test_a_connection_that_breaks_is_counted_and_made_anew_on_the_same_clock(fau
     assert np.diff(t).max() > 0.1  # the hole is not closed
 
 
+def test_silence_is_noticed_when_it_has_lasted_as_long_as_it_may():
+    """`ur_rtde` itself waits three seconds for a controller that is silent, before its connection can be let go."""
+    with RtdeStandIn(PLAYED, faults={200: "silence"}) as stand_in, robot_at(stand_in, silence=0.6).connect() as link:
+        heard = time.monotonic()
+        for sample in link:
+            if sample is None:
+                break
+            heard = time.monotonic()
+        assert 0.5 < time.monotonic() - heard < 2.5
+
+
 def test_a_package_that_comes_twice_or_late_breaks_nothing():
     with RtdeStandIn(PLAYED, faults={30: "repeat", 50: "late"}) as stand_in:
         found, link = samples(stand_in, 100)

@@ -167,6 +167,18 @@ def test_a_log_without_a_header_gets_a_map_of_indices(tmp_path: Path) -> None:
     assert_is_table(read_recording(path, map=parse_map(map_skeleton(path))), table())
 
 
+@pytest.mark.parametrize(
+    ("width", "torque"),
+    [(31, "{13..18}"), (13, "{7..12}"), (22, "{15..21}"), (15, "{8..14}"), (7, "{5..6}"), (25, "{13..18}")],
+)
+def test_columns_without_names_are_taken_for_six_or_seven_joints_where_they_fit(
+    tmp_path: Path, width: int, torque: str
+) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(f"{','.join(['0'] * width)}\n" * 3, encoding="utf-8")
+    assert f'[torque]\ncolumns = "{torque}"' in map_skeleton(path)
+
+
 def damaged(number: int) -> str:
     """A log whose line `number` is cut after half of its characters."""
     lines = text(table()).splitlines(keepends=True)

@@ -18,8 +18,9 @@ from tauhat.report.force_marks import (
     error_ellipsoid,
     full_scale,
 )
-from tauhat.report.live_panel import contacts_html, joints_html, size_of_force, status_html, wrench_html
+from tauhat.report.live_panel import contacts_html, counts_html, joints_html, size_of_force, status_html, wrench_html
 from tauhat.report.live_plots import SPAN, History, force_columns, torque_columns
+from tauhat.sensing.touch import Touch
 
 COVARIANCE = np.array([[4.0, 1.0, 0.5], [1.0, 9.0, -2.0], [0.5, -2.0, 16.0]])
 
@@ -50,6 +51,23 @@ def test_a_hidden_direction_is_cut_off_and_named():
 def test_directions_beside_the_axes_are_told_in_numbers():
     assert direction_text(np.array([0.0, -1.0, 0.0])) == "y"
     assert direction_text(np.array([-0.6, 0.0, -0.8])) == "(+0.6, +0.0, +0.8)"
+    assert direction_text(np.array([0.706, 0.706, -0.04])) == "(+0.7, +0.7, +0.0)"
+
+
+def test_a_figure_of_one_direction_has_the_error_bar_of_one_direction():
+    covariance = np.diag([1.0, 9.0, 4.0])
+    found = error_ellipsoid(covariance, largest=np.inf)
+    wrench = np.array([0.0, 5.0, 0.0, 0.0, 0.0, 0.0])
+    assert direction_text(found.axes[:, -1]) == "y"
+    assert found.bar == pytest.approx(size_of_force(wrench, np.diag([1.0, 9.0, 4.0, 1.0, 1.0, 1.0]))[1])
+    assert found.bar == pytest.approx(norm.ppf(0.975) * 3.0, rel=1e-5)
+
+
+def test_one_is_counted_in_the_singular():
+    told = counts_html({"taken": 1, "restarts": 1, "dropped": 2, "late": 1})
+    for words in ("1 sample taken", "1 restart<", "2 answers dropped", "1 late"):
+        assert words in told
+    assert "12 345 samples taken" in counts_html({"taken": 12345})
 
 
 @given(value=st.floats(1e-3, 1e6), current=st.floats(0.0, 1e6))
@@ -68,22 +86,21 @@ def test_a_value_at_a_step_does_not_make_its_scale_flicker():
     assert seen == [2.0, 5.0, 5.0, 5.0, 5.0, 1.0]
 
 
-def test_contacts_begin_peak_and_end():
+def test_a_contact_is_one_row_whatever_its_link_and_ends_with_its_stream():
     log = ContactLog()
-    for t, link, force in [
-        (0.0, "", 9.0),
-        (0.1, "a", 2.0),
-        (0.2, "a", 5.0),
-        (0.3, "a", 1.0),
-        (0.4, "", 0.0),
-        (0.5, "b", 3.0),
-        (0.6, "c", 4.0),
-    ]:
-        log.see(t, link, force)
-    told = [(one.link, one.begin, one.end, one.peak, one.lasts) for one in reversed(log.contacts)]
-    assert told == [("a", 0.1, 0.4, 5.0, False), ("b", 0.5, 0.6, 3.0, False), ("c", 0.6, 0.6, 4.0, True)]
-    for k in range(200):
-        log.see(1.0 + k, "x" if k % 2 else "", 1.0)
+    first = Touch(1, "a", 0.1, 0.1, 2.0, open=True)
+    over = first._replace(link="c", end=0.4, peak=5.0, open=False)
+    second, third = Touch(2, "b", 0.5, 0.6, 3.0, open=True), Touch(4, "b", 0.8, 0.9, 3.0, open=True)
+    for newest in (None, first, first._replace(link="c", end=0.3, peak=5.0), over, over):
+        log.see(newest)
+    assert log.contacts == (over,)
+    log.see(second)
+    log.see(third)  # the second's end was not shown, nor anything of the third
+    assert log.contacts == (third, second._replace(open=False), over)
+    log.end()
+    assert log.contacts[0] == third._replace(open=False)
+    for number in range(5, 200):
+        log.see(third._replace(number=number))
     assert len(log.contacts) == 50
 
 
@@ -134,14 +151,13 @@ def test_forces_are_told_with_units_and_error_bars():
         "−0.30 ± 0.20",
     ):
         assert words in told
+    assert "−0.0 " not in wrench_html(np.full(6, -1e-3), np.eye(6), axes="frame")
 
 
 @pytest.mark.parametrize("name", ["<script>alert(1)</script>", '"><img src=x onerror=alert(1)>', "a" * 500])
 def test_names_from_outside_stay_text_and_short(name):
-    log = ContactLog()
-    log.see(0.0, name, 1.0)
     for told in (
-        contacts_html(log.contacts),
+        contacts_html([Touch(1, name, 0.0, 0.0, 1.0, open=True)]),
         joints_html([name], np.ones(1), np.ones(1)),
         status_html("live", "live", name),
     ):

@@ -85,7 +85,7 @@ def test_a_higher_rate_gives_lower_thresholds():
 
 def test_too_little_free_motion_is_said_and_takes_the_margin_on_the_largest():
     log = sensed(noise(60.0, 4))
-    with pytest.warns(TauhatWarning, match=r"60 s of free motion can promise 58 false alarms an hour, 1 were asked"):
+    with pytest.warns(TauhatWarning, match=r"60 s of free motion can promise 58 false alarms an hour, asked for: 1;"):
         short = thresholds_of([log], slow=SLOW)
     assert not short.keeps_rate
     # 30 blocks moving and none standing: one block in 31 may alarm, 1800 blocks an hour

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tauhat.sensing.zero import Zero
 
 
-_Judge: TypeAlias = "Callable[[Sensed], tuple[Sensed, dict[str, Any]]]"
+_Judge: TypeAlias = "Callable[[float, Sensed], tuple[Sensed, dict[str, Any]]]"
 
 
 def answer(sensor: ForceSensor, thresholds: ContactThresholds | None = None, *, zero: Zero = "as sensed") -> None:
@@ -49,7 +49,7 @@ def answer(sensor: ForceSensor, thresholds: ContactThresholds | None = None, *, 
             continue
         memory, sensed = stream.take(memory, sample.t, np.array(sample.q), np.array(sample.tau))
         if sensed is not None:
-            told, said = judge(sensed)
+            told, said = judge(sample.t, sensed)
             sys.stdout.write(json.dumps(_answered(sample.t, told) | said, allow_nan=False) + "\n")
             sys.stdout.flush()
     counts = memory.counts._replace(malformed=malformed)
@@ -68,26 +68,28 @@ def _answered(t: float, sensed: Sensed) -> dict[str, Any]:
     }
 
 
-def _no_contacts(sensed: Sensed) -> tuple[Sensed, dict[str, Any]]:
+def _no_contacts(_: float, sensed: Sensed) -> tuple[Sensed, dict[str, Any]]:
     return sensed, {}
 
 
 def _contacts(thresholds: ContactThresholds, sensor: ForceSensor, zero: Zero) -> _Judge:
     """Return what says of each sample in turn whether something touches the arm."""
     from tauhat.sensing.contact import ContactDetector
+    from tauhat.sensing.touch import TouchFollower
 
     detector = ContactDetector(thresholds=thresholds, step=sensor.step)
     detector.check_joints(tuple(sensor.model.robot.joint_names), where="standard input")
-    memory, touched = detector.start(), False
+    memory, touches = detector.start(), TouchFollower(detector)
 
-    def judge(sensed: Sensed) -> tuple[Sensed, dict[str, Any]]:
-        nonlocal memory, touched
+    def judge(t: float, sensed: Sensed) -> tuple[Sensed, dict[str, Any]]:
+        nonlocal memory
         memory, found = detector.advance(memory, sensed.tau, sensed.variance, sensed.dq, settled=sensed.settled)
+        told = _less(sensed, found.zero, sensor.solver) if zero == "standing" else sensed
         said: dict[str, Any] = {"contact": found.contact, "excess": float(f"{found.excess:.4g}"), "link": found.link}
-        if found.contact != touched:
-            said["event"] = "start" if found.contact else "end"
-        touched = found.contact
-        return (_less(sensed, found.zero, sensor.solver) if zero == "standing" else sensed), said
+        event = touches.see(t, memory, float(np.linalg.norm(told.wrench[:3])))
+        if event == "end" and touches.newest is not None:
+            said["link"] = touches.newest.link  # of the whole contact
+        return told, (said if event is None else said | {"event": event})
 
     return judge
 
@@ -109,5 +111,6 @@ def _sentence(counts: SampleCounts) -> str:
         "late": counts.late, "repeated": counts.repeated, "not finite": counts.not_finite,
         "malformed": counts.malformed,
     }  # fmt: skip
+    again = "once" if counts.restarts == 1 else f"{counts.restarts} times"
     frozen = f"; frozen, as of a controller that hangs: {counts.frozen}" if counts.frozen else ""
-    return f"{counts.taken} samples; skipped: {counted(skipped)}; started again {counts.restarts} times{frozen}"
+    return f"{counts.taken} samples; skipped: {counted(skipped)}; started again {again}{frozen}"

@@ -51,14 +51,14 @@ class Clients:
 
     Attributes
     ----------
-    totals : clients so far, and the counts of those that have left
+    totals : clients so far, connections that were turned away, and the counts of the clients that have left
     waiting : connections that are no clients yet
     followers : those that are sent what is said of the robot that the server reads
     """
 
     def __init__(self, service: Service) -> None:
         self.service = service
-        self.totals: Counter[str] = Counter()
+        self.totals: Counter[str] = Counter(clients=0, turned_away=0)
         self.waiting = WaitingRoom(service.limits.waiting)
         self.followers = Followers()
         self._clients: set[Client] = set()
@@ -97,6 +97,8 @@ class Clients:
             self.service, name=f"{kind} {self.totals['clients']}", outbox=outbox,
             followers=None if kind in _UNPROVED else self.followers, judged=None if kind in _AGREED else JUDGED,
         )  # fmt: skip
+        if kind in _AGREED:
+            self.followers.command = session.command
         client = Client(session, outbox, limits=limits, now=now, hang_up=hang_up)
         self._clients.add(client)
         return client

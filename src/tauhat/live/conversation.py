@@ -62,6 +62,7 @@ async def converse(channel: Channel, clients: Clients, *, access: Access | None)
         client = clients.admit(channel.kind, asyncio.get_running_loop().time(), hang_up=channel.abort)
         channel.admitted()
     except TauhatError as error:
+        clients.totals["turned_away"] += 1
         await _said(channel, refusal_text(error))
         return
     except (EOFError, OSError):

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 from tauhat.arrays import FloatArray
+from tauhat.sensing.touch import Touch
 
 A_SECOND = 30.0  # snapshots, over all streams
 
@@ -20,7 +21,7 @@ class Snapshot(NamedTuple):
     q, tau : (n_v,) position, and external torque less what was zeroed [rad or m, Nm or N]
     tau_std : (n_v,) its standard error
     wrench, covariance : (6,), (6, 6) at the sensor's frame [N, Nm]
-    contact : the link that is touched, empty without contact
+    contact : the latest, None before the first
     counts : taken, late, not_finite, dropped, refused, restarts, frozen
     """
 
@@ -31,7 +32,7 @@ class Snapshot(NamedTuple):
     tau_std: FloatArray
     wrench: FloatArray
     covariance: FloatArray
-    contact: str
+    contact: Touch | None
     counts: dict[str, int]
 
 
@@ -44,6 +45,9 @@ class Page(Protocol):
 
     def send(self, snapshot: Snapshot, /) -> object:
         """Show a snapshot, or leave it where that would have to wait."""
+
+    def end(self, stream: str, /) -> None:
+        """Say that a stream that was shown has ended, without waiting."""
 
     def commands(self) -> list[str]:
         """Return what was asked for since the last call, at once."""
@@ -92,8 +96,9 @@ class Feed:
         return [] if self._page is None else self._page.commands()
 
     def forget(self, stream: str) -> None:
-        """Leave the turns to other streams: this one has ended."""
-        self._due.pop(stream, None)
+        """Leave the turns to other streams: this one has ended, and where it was shown that is said."""
+        if self._due.pop(stream, None) is not None and self._page is not None:
+            self._page.end(stream)
 
     def close(self) -> None:
         """End the page."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from tauhat.live.outbox import Outbox
 from tauhat.live.protocol import notice_text
 
@@ -15,11 +17,13 @@ class Followers:
     ----------
     robot : its address, None where the server reads none
     state : what it does, as its link says
+    command : zeroes or unzeroes the robot's stream; returns whether it has samples
     """
 
     def __init__(self) -> None:
         self.robot: str | None = None
         self.state = ""
+        self.command: Callable[[str], bool] = lambda _: False
         self._outboxes: set[Outbox] = set()
 
     def __contains__(self, outbox: Outbox) -> bool:

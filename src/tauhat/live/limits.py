@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
+from tauhat.arrays import check_fields
 from tauhat.errors import LiveError
 
 
@@ -35,7 +36,4 @@ class Limits:
     notice: float = 1.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not 0 < value < float("inf"):
-                raise LiveError("a limit that bounds nothing", where=field.name, expected="above zero", got=value)
+        check_fields(self, error=LiveError, name="limits of a server")

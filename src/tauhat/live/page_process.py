@@ -1,7 +1,8 @@
 """The page in a process of its own, so that drawing takes no time from sensing.
 
-Towards the page go tuples of the server's own numbers. Back come single words, which are compared and never unpacked:
-whatever a browser does to the page's process, nothing of it is run in the server.
+Towards the page go tuples of the server's own numbers, and the names of streams that have ended. Back come single
+words, which are compared and never unpacked: whatever a browser does to the page's process, nothing of it is run in the
+server.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import signal
 import tempfile
 import threading
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 _A_SECOND, _BURST = 30.0, 3.0  # snapshots on average, and at once
 _UNDERWAY = 2  # snapshots that the page has not taken yet: they fit the pipe, so that sending never waits
 _WORDS = frozenset({b"zero"})
+_ENDS = 64  # streams whose end the page was not told yet
 _TAKEN, _LONGEST = b"taken", 2048
 _BEGIN = 60.0  # [s] for the process to begin
 _END = 5.0  # [s] for it to end
@@ -60,6 +63,7 @@ class PageProcess:
         self._allowance, self._counted_at = _BURST, time.monotonic()
         self._looked_at = 0.0
         self._asked: list[str] = []
+        self._ended: deque[str] = deque(maxlen=_ENDS)
         self._lock = threading.Lock()
 
     @property
@@ -84,13 +88,19 @@ class PageProcess:
         self.dropped += 1
         return False
 
+    def end(self, stream: str) -> None:
+        """Tell the page, behind what it was shown of a stream, that it has ended: now or when it takes more."""
+        with self._lock:
+            self._ended.append(stream)
+            self._tell_ends()
+
     def commands(self) -> list[str]:
         """Return what was asked for on the page since the last call, at once: `zero`."""
         now = time.monotonic()
         with self._lock:
             if now - self._looked_at >= 1.0 / _A_SECOND:
                 self._looked_at = now
-                self._listen()
+                self._tell_ends()
             asked, self._asked = self._asked, []
         return asked
 
@@ -108,8 +118,18 @@ class PageProcess:
         self._counted_at = now
         if self._allowance < 1.0:
             return False
-        self._listen()
+        self._tell_ends()
         return self._underway < _UNDERWAY
+
+    def _tell_ends(self) -> None:
+        """Take the words that have come, and tell of ends as far as the page takes more."""
+        self._listen()
+        try:
+            while self._ended and self._underway < _UNDERWAY:
+                self._connection.send(self._ended.popleft())
+                self._underway += 1
+        except (OSError, ValueError):
+            self._ended.clear()  # the page is gone
 
     def _listen(self) -> None:
         """Take the words that have come."""
@@ -220,7 +240,11 @@ def _follow(connection: Connection, page: LivePage) -> None:
     while True:
         ready = wait(ends, timeout=_IDLE)
         if connection in ready:
-            page.show(Snapshot(*connection.recv()))
+            told = connection.recv()
+            if isinstance(told, str):
+                page.end(told)
+            else:
+                page.show(Snapshot(*told))
             connection.send_bytes(_TAKEN)
         elif ready:
             return

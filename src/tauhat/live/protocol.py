@@ -31,7 +31,8 @@ from tauhat.robots.robot import Robot
 from tauhat.sensing.sample_lines import Sample, sample_of
 
 PROTOCOL = 1
-COMMANDS = ("zero", "unzero", "counts", "follow", "end")
+ZEROS = ("zero", "unzero")
+COMMANDS = (*ZEROS, "counts", "follow", "end")
 _NO_NUMBER = re.compile(r"-?(?:nan|inf)")
 _LARGEST_REFUSAL = 300  # [characters]; on datagrams an answer shall not be much longer than what it answers
 
@@ -128,7 +129,7 @@ def notice_text(kind: str, **facts: Any) -> str:
     skipped : samples were not taken; `counts` of all kinds
     frozen : samples repeat to the bit, as of a controller that hangs; `counts` of all kinds
     slowed : more messages a second than granted; they are read more slowly, datagrams skipped
-    zero : what was taken off the external torque, `tau_ext`
+    zero : what is taken off the external torque, `tau_ext`; null where there is nothing to take it off, and `why`
     counts : as asked for
     follow : the answers to `robot`, which is in `state`, are yours from now on; null where the server reads none
     robot : the robot that is followed is in another `state`: running, or why not

@@ -66,7 +66,7 @@ class Sender:
         self._connection.send(json.dumps({"t": t, "q": list(q), "tau": list(tau)}))
 
     def command(self, name: str) -> None:
-        """Ask for something: `zero`, `unzero` or `counts`; the answer is a notice."""
+        """Ask for something: `zero`, `unzero`, `counts` or `follow`, the answer is a notice; `end` ends the stream."""
         self._connection.send(json.dumps({"command": name}))
 
     def answers(self, seconds: float = 0.0) -> list[dict[str, Any]]:
@@ -74,27 +74,34 @@ class Sender:
 
         Parameters
         ----------
-        seconds : to wait for the first message
+        seconds : to wait for the first answer or notice; the greeting alone is neither
 
         Raises
         ------
         LiveError
             when the server has refused, or ended the connection.
         """
-        found = []
-        for text in self._connection.exchange(seconds):
-            message = json.loads(text)
+        end = time.monotonic() + seconds
+        found: list[dict[str, Any]] = []
+        texts = self._connection.exchange(seconds)
+        while not self._sorted(texts, found) and self._connection.is_open and (left := end - time.monotonic()) > 0.0:
+            texts = self._connection.exchange(left)
+        if not found and not self._connection.is_open:
+            raise LiveError("the server ended the connection" if self.hello else "nobody answers", where=self.address)
+        return found
+
+    def _sorted(self, texts: Sequence[str], found: list[dict[str, Any]]) -> bool:
+        """Put messages where they belong, answers into `found`; return whether there is an answer or a notice."""
+        heard = False
+        for message in map(json.loads, texts):
             if "refused" in message:
                 raise LiveError("the server refuses", where=self.address, got=message["refused"])
             if "hello" in message:
                 self.hello = message
-            elif "notice" in message:
-                self.notices.append(message)
-            else:
-                found.append(message)
-        if not found and not self._connection.is_open:
-            raise LiveError("the server ended the connection" if self.hello else "nobody answers", where=self.address)
-        return found
+                continue
+            heard = True
+            (self.notices if "notice" in message else found).append(message)
+        return heard
 
     def replay(self, log: Recording | Log, *, speed: float = 1.0) -> Iterator[dict[str, Any]]:
         """Yield the answers to a recording's samples, sent at the pace of its time stamps.

@@ -11,11 +11,13 @@ from tauhat.arrays import FloatArray
 from tauhat.live.feed import Snapshot
 from tauhat.live.followers import Followers
 from tauhat.live.outbox import Outbox
-from tauhat.live.protocol import COMMANDS, AnswerForm, Command, decoded, message_of, notice_text
+from tauhat.live.protocol import ZEROS, AnswerForm, Command, decoded, message_of, notice_text
 from tauhat.live.service import Service
+from tauhat.sensing.contact import ContactSample
 from tauhat.sensing.sample_lines import Sample
 from tauhat.sensing.sensor import Sensed
 from tauhat.sensing.stream import JUDGED, SensorStream
+from tauhat.sensing.touch import TouchFollower
 
 
 class Session:
@@ -41,8 +43,7 @@ class Session:
         self._stream = SensorStream(sensor=service.sensor, name=name, judged=judged)
         self._memory = self._stream.start()
         self._contact = None if service.detector is None else service.detector.start()
-        self._link: str | None = None
-        self._touched = False
+        self._touches = None if service.detector is None else TouchFollower(service.detector)
         self._form = AnswerForm(service.sensor.n_v)
         self._links = {link: json.dumps(link) for link in service.sensor.model.robot.joint_names}
         self._zero: FloatArray | None = None
@@ -77,27 +78,41 @@ class Session:
         elif isinstance(message, Command):
             if message.name == "end":
                 raise EOFError
-            self.command(message.name)
+            self._obey(message.name)
         elif message is None:
             self._malformed += 1
             self._tell("skipped", now)
 
-    def command(self, name: str) -> None:
-        """Do what was asked for, by the client or on the page."""
-        if name not in COMMANDS:
-            return
+    def command(self, name: str) -> bool:
+        """Zero or unzero this stream and say so, as its client asks, the page, or who follows it.
+
+        Returns whether it has samples: without them there is nothing to zero, and nothing is said.
+        """
+        last = self._last
+        if name not in ZEROS or last is None:
+            return False
+        self._zero = last.tau.copy() if name == "zero" else None
+        if self._service.detector is not None:
+            self._contact = self._service.detector.start()
+        taken_off = np.zeros(self._service.sensor.n_v) if self._zero is None else self._zero
+        self._outbox.put(notice_text("zero", tau_ext=[float(f"{value:.6g}") for value in taken_off]), answers=0)
+        return True
+
+    def _obey(self, name: str) -> None:
+        """Do what the client asks for; a follower without samples of its own means the robot's by `zero`."""
         if name == "counts":
             self._outbox.put(notice_text("counts", counts=self.counts), answers=0)
             return
         if name == "follow":
             self._follow()
             return
-        last = self._last
-        self._zero = last.tau.copy() if name == "zero" and last is not None else None
-        if self._service.detector is not None:
-            self._contact = self._service.detector.start()
-        taken_off = np.zeros(self._service.sensor.n_v) if self._zero is None else self._zero
-        self._outbox.put(notice_text("zero", tau_ext=[float(f"{value:.6g}") for value in taken_off]), answers=0)
+        followers = self._followers
+        if followers is not None and self._outbox in followers and self._last is None:
+            done, why = followers.command(name), "no sample of the robot has come yet"
+        else:
+            done, why = self.command(name), "you have sent no samples, and do not follow the robot"
+        if not done:
+            self._outbox.put(notice_text("zero", tau_ext=None, why=why), answers=0)
 
     def _follow(self) -> None:
         followers, robot, state = self._followers, None, None
@@ -125,8 +140,10 @@ class Session:
         if self._memory.counts.frozen > counts.frozen:
             self._tell("frozen", now)
         felt = sensed.tau if self._zero is None else sensed.tau - self._zero
-        more, standing = self._judged(sensed, felt)
+        found = self._judged(sensed, felt)
+        standing = found.zero if found is not None and self._service.zero == "standing" else None
         tau, wrench = self._less(sensed, felt if standing is None else felt - standing)
+        more = "" if found is None else self._said(sample.t, found, wrench)
         self._outbox.put(self._form.text(sample.t, (tau, sensed.variance, wrench, sensed.covariance), more))
         if self._service.feed.is_due(self.name, now):
             self._service.feed.publish(self._snapshot(sample.t, sensed, tau, wrench))
@@ -137,24 +154,29 @@ class Session:
             return tau, sensed.wrench
         return tau, self._service.solver.at(sensed.q, tau, sensed.variance + np.square(sensed.lag)).wrench
 
-    def _judged(self, sensed: Sensed, tau: FloatArray) -> tuple[str, FloatArray | None]:
-        """Return what is said of contact, as further members of the answer, and the zero to take off for it."""
+    def _judged(self, sensed: Sensed, tau: FloatArray) -> ContactSample | None:
         detector, memory = self._service.detector, self._contact
         if detector is None or memory is None:
-            return "", None
+            return None
         self._contact, found = detector.advance(memory, tau, sensed.variance, sensed.dq, settled=sensed.settled)
-        self._link = found.link
-        link = "null" if found.link is None else self._links[found.link]
-        said = f', "contact": {"true" if found.contact else "false"}, "excess": {found.excess:.4g}, "link": {link}'
-        if found.contact != self._touched:
-            self._touched = found.contact
-            said += f', "event": "{"start" if found.contact else "end"}"'
-        return said, found.zero if self._service.zero == "standing" else None
+        return found
+
+    def _said(self, t: float, found: ContactSample, wrench: FloatArray) -> str:
+        """Return what is said of contact, as further members of the answer; an end names the link of the whole."""
+        event, link = None, found.link
+        if self._touches is not None and self._contact is not None:
+            event = self._touches.see(t, self._contact, float(np.linalg.norm(wrench[:3])))
+            if event == "end" and self._touches.newest is not None:
+                link = self._touches.newest.link
+        told = "null" if link is None else self._links[link]
+        said = f', "contact": {"true" if found.contact else "false"}, "excess": {found.excess:.4g}, "link": {told}'
+        return said if event is None else f'{said}, "event": "{event}"'
 
     def _snapshot(self, t: float, sensed: Sensed, tau: FloatArray, wrench: FloatArray) -> Snapshot:
         counts = self._memory.counts
         return Snapshot(
-            self.name, t, sensed.q, tau, np.sqrt(sensed.variance), wrench, sensed.covariance, self._link or "",
+            self.name, t, sensed.q, tau, np.sqrt(sensed.variance), wrench, sensed.covariance,
+            None if self._touches is None else self._touches.newest,
             {
                 "taken": counts.taken, "late": counts.late + counts.repeated, "not_finite": counts.not_finite,
                 "dropped": self._outbox.dropped, "refused": self._malformed + self._limited,

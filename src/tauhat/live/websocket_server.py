@@ -109,7 +109,7 @@ async def serve_websocket(clients: Clients, access: Access, *, port: int) -> tup
 
     try:
         server = await serve(
-            answer, access.host, port, process_request=partial(_judged, access=access),
+            answer, access.host, port, process_request=partial(_judged, access=access, clients=clients),
             create_connection=cast("type[ServerConnection]", partial(_Connection, clients=clients)),
             compression=None, server_header=None, open_timeout=limits.handshake, close_timeout=_FAREWELL,
             ping_interval=_RESTING, ping_timeout=_RESTING, max_size=limits.message, max_queue=_READ_AHEAD,
@@ -132,7 +132,7 @@ async def _closed(connection: ServerConnection) -> None:
     await closing
 
 
-def _judged(connection: ServerConnection, request: Request, *, access: Access) -> Response | None:
+def _judged(connection: ServerConnection, request: Request, *, access: Access, clients: Clients) -> Response | None:
     """Return a refusal of whoever has no business here, None for all others."""
     hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
     given = request.headers.get_all("Authorization")
@@ -143,5 +143,6 @@ def _judged(connection: ServerConnection, request: Request, *, access: Access) -
     if len(origins) > 1 or not access.knows_origin(next(iter(origins), None), hosts[0]):
         return connection.respond(HTTPStatus.FORBIDDEN, "not from this page\n")
     if given and not (len(given) == 1 and access.admits_authorization(given[0])):
+        clients.totals["turned_away"] += 1
         return connection.respond(HTTPStatus.UNAUTHORIZED, "not the token\n")
     return None

@@ -23,6 +23,7 @@ _CURRENT_LIKE = re.compile('^"i[_{]|cur|amp')
 _TORQUE_LIKE = re.compile(f"{_CURRENT_LIKE.pattern}|tau|torq|effort|moment|force")
 _NOT_MEASURED_HERE = re.compile("target|desired|command|goal|tcp|tool")  # what was wished, or is not of the joints
 _SPEED_LIKE = re.compile("dq|qd|vel|speed|omega")
+_USUAL_JOINTS = (6, 7)  # of industrial arms
 _WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
@@ -96,15 +97,21 @@ def _guesses(table: Table) -> tuple[str, dict[str, str]]:
     """Return TOML values for the clock, and for the position, velocity and torque columns as far as there are any."""
     kinds = ("position", "velocity", "torque")
     if not table.groups:
-        joints = max(1, (table.width - 1) // 3)
+        joints = _likely_joints(table.width - 1)
         spans = [(1 + k * joints, (k + 1) * joints) for k in range(3) if (k + 1) * joints < table.width]
         texts = [f'"{{{first}..{last}}}"' for first, last in spans or [(0, 0)]]
-        return "0", dict(zip(kinds, texts, strict=False))
+        return "0", dict(zip(kinds if len(spans) != 2 else ("position", "torque"), texts, strict=False))
     runs = compact_names(tuple(name for name in table.groups if not name.endswith("]")))
     quoted = [f'"{run}"' for run in runs]
     wide = [text for text, run in zip(quoted, runs, strict=True) if "{" in run or len(table.groups.get(run, ())) > 1]
     clock = next((text for text, run in zip(quoted, runs, strict=True) if run.lower().startswith("t")), quoted[0])
     return clock, _placed(wide or [text for text in quoted if text != clock] or quoted)
+
+
+def _likely_joints(columns: int) -> int:
+    """Return how many joints columns behind a clock are of: six or seven where they fit twice or more, else a third."""
+    fits = (count for count in _USUAL_JOINTS if columns >= 2 * count and columns % count == 0)
+    return next(fits, max(1, columns // 3))
 
 
 def _placed(found: list[str]) -> dict[str, str]:

@@ -36,6 +36,11 @@ class ErrorEllipsoid:
         return float(self.half[-1])
 
     @property
+    def bar(self) -> float:
+        """Error bar along the largest half-axis alone, 95 % of a normal error in one dimension [N]."""
+        return self.widest * SURE_ON_LINE / SURE_IN_SPACE
+
+    @property
     def cut(self) -> FloatArray:
         """Directions along which it is cut off, (n, 3)."""
         return np.asarray(self.axes.T[self.half > self.drawn * (1.0 + _ROUNDING)])
@@ -75,5 +80,5 @@ def direction_text(direction: FloatArray) -> str:
     main = int(np.argmax(np.abs(direction)))
     if abs(direction[main]) > 0.97:
         return "xyz"[main]
-    turned = direction * np.sign(direction[main]) + 0.0  # no minus before a zero
+    turned = np.round(direction * np.sign(direction[main]), 1) + 0.0  # no minus before a zero
     return f"({', '.join(f'{value:+.1f}' for value in turned)})"

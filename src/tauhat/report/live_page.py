@@ -25,15 +25,17 @@ from tauhat.report.live_panel import (
 from tauhat.report.live_plots import History, Plots
 from tauhat.report.live_scene import LiveScene
 from tauhat.robots.robot import Robot
+from tauhat.sensing.touch import Touch
 from tauhat.sensing.wrench import Axes
 
 _REFRESH = 0.1  # [s] between drawings of words and plots
 _SILENT = 1.0  # [s] without a new sample
-_WIDE = 100.0  # [N] half-axis of the 95 % ellipsoid beyond which the force is said to be unknown there
+_WIDE = 100.0  # [N] error bar along a direction beyond which the force is said to be unknown there
 _LEAST = 10.0  # [N] smallest full scale of the arrow
 _MOST_STREAMS = 16
 _BETWEEN_ZEROS = 1.0  # [s]: a button pressed twice is meant once
 _PANEL = 430  # [px]
+_LAST = "Its client has left: the arm and the numbers are as last told, and no force is drawn."
 _HINT = "Take what is felt now for zero. Nothing may touch the arm."
 
 
@@ -69,8 +71,8 @@ class Reading(Protocol):
         """Of the wrench, (6, 6)."""
 
     @property
-    def contact(self) -> str:
-        """The link that is touched, empty without contact."""
+    def contact(self) -> Touch | None:
+        """The latest contact, None before the first."""
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -78,10 +80,14 @@ class Reading(Protocol):
 
 
 class _Stream:
-    """What is kept of one stream: newest reading, when it began and last went on, its last seconds, its contacts."""
+    """What is kept of one stream: newest reading, when it began and last went on, its last seconds, its contacts.
+
+    has_ended : whether its client has left
+    """
 
     def __init__(self, n_v: int, now: float) -> None:
         self.newest: Reading | None = None
+        self.has_ended = False
         self.began_at = self.alive_at = now
         self.history = History(n_v)
         self.contacts = ContactLog()
@@ -92,7 +98,14 @@ class _Stream:
         self.newest = reading
         force, variances = np.asarray(reading.wrench)[:3], np.diagonal(reading.covariance)[:3]
         self.history.add(reading.t, force, np.sqrt(np.maximum(variances, 0.0)), reading.tau)
-        self.contacts.see(reading.t, reading.contact, float(np.linalg.norm(force)))
+        self.contacts.see(reading.contact)
+
+    def end(self) -> None:
+        self.has_ended = True
+        self.contacts.end()
+
+    def is_alive(self, now: float) -> bool:
+        return not self.has_ended and now - self.alive_at < _SILENT
 
 
 class LivePage:
@@ -150,7 +163,16 @@ class LivePage:
         stream.take(reading, now)
         self._follow(reading.stream, now)
         if stream is self._seen():
-            self._draw(reading, stream.history)
+            self._draw(stream, reading)
+
+    def end(self, name: str) -> None:
+        """Take note that a stream has ended: no force is drawn any more, and its last contact is over."""
+        stream = self._streams.get(name)
+        if stream is None:
+            return
+        stream.end()
+        if stream is self._seen():
+            self._scene.hide_force()
 
     def refresh(self) -> None:
         """Draw words and plots if it is time to and somebody looks; call it often."""
@@ -164,13 +186,13 @@ class LivePage:
         reading = stream.newest
         with self._server.atomic():
             if self._drawn is not reading:  # another stream was chosen, and says nothing
-                self._draw(reading, stream.history)
+                self._draw(stream, reading)
             self._wrench.content = wrench_html(reading.wrench, reading.covariance, axes=self._axes)
             self._plots.words.content = joints_html(self._robot.joint_names, reading.tau, reading.tau_std)
             self._contacts.content = contacts_html(stream.contacts.contacts)
             self._counts.content = counts_html(reading.counts)
             self._say_state(stream, reading, now)
-            if now - stream.alive_at < _SILENT or self._plotted is not reading:
+            if stream.is_alive(now) or self._plotted is not reading:
                 self._plots.show(stream.history)
                 self._plotted = reading
 
@@ -182,21 +204,22 @@ class LivePage:
         return asked
 
     def _begin(self, name: str, now: float) -> _Stream:
-        """Return a new stream; of too many, the one that has been silent longest is forgotten."""
+        """Return a new stream; of too many, one that has ended is forgotten, or that has been silent longest."""
         if len(self._streams) >= _MOST_STREAMS:
-            del self._streams[min(self._streams, key=lambda known: self._streams[known].alive_at)]
+            known = self._streams
+            del known[min(known, key=lambda one: (not known[one].has_ended, known[one].alive_at))]
         self._streams[name] = stream = _Stream(self._robot.n_v, now)
         self._choice.options = tuple(self._streams)
         self._choice.visible = len(self._streams) > 1
         return stream
 
     def _follow(self, name: str, now: float) -> None:
-        """Look at this stream if it began after the one that is looked at fell silent: a client that came again.
+        """Look at this stream if it began after the one that is looked at ended or fell silent: its client came again.
 
         A stream that was chosen by hand stays, and none that ran beside it takes its place.
         """
         seen = self._seen()
-        if seen is not None and (self._choice.value == self._chosen or now - seen.alive_at < _SILENT):
+        if seen is not None and (self._choice.value == self._chosen or seen.is_alive(now)):
             return
         if seen is None or self._streams[name].began_at > seen.alive_at:
             self._choice.value = name
@@ -208,9 +231,11 @@ class LivePage:
     def _seen(self) -> _Stream | None:
         return self._streams.get(self._choice.value)
 
-    def _draw(self, reading: Reading, history: History) -> None:
-        error = self._error(reading, history)
+    def _draw(self, stream: _Stream, reading: Reading) -> None:
+        error = self._error(reading, stream.history)
         self._scene.show(reading.q, np.asarray(reading.wrench)[:3], error, scale=self._scale)
+        if stream.has_ended:
+            self._scene.hide_force()
         self._drawn = reading
 
     def _error(self, reading: Reading, history: History) -> ErrorEllipsoid:
@@ -224,17 +249,20 @@ class LivePage:
     def _say_state(self, stream: _Stream, reading: Reading, now: float) -> None:
         silent = now - stream.alive_at
         self._scene.colour(stale=silent >= _SILENT)
-        error = self._error(reading, stream.history)
-        if silent >= _SILENT:
+        error, touch = self._error(reading, stream.history), reading.contact
+        if stream.has_ended:
+            state, words = "ended", "the stream has ended"
+        elif silent >= _SILENT:
             state, words = "silent", f"silent for {silent:.0f} s"
-        elif error.widest > _WIDE:
+        elif error.bar > _WIDE:
             place = direction_text(error.axes[:, -1])
-            state, words = "wide", f"live, error bar too wide: ± {error.widest:.0f} N along {place}"
+            state, words = "wide", f"live, error bar too wide: ± {error.bar:.0f} N along {place}"
         else:
-            state, words = "live", f"live, contact at {reading.contact}" if reading.contact else "live"
+            state, words = "live", f"live, contact at {touch.link}" if touch is not None and touch.open else "live"
         where = f"{reading.stream}, t = {reading.t:.1f} s"
         self._status.content = status_html(state, words, where)
-        self._notes.content = boxed(f'<span class="faint">{self._caption(reading, error, now)}</span>')
+        caption = _LAST if stream.has_ended else self._caption(reading, error, now)
+        self._notes.content = boxed(f'<span class="faint">{caption}</span>')
 
     def _caption(self, reading: Reading, error: ErrorEllipsoid, now: float) -> str:
         size, bar = size_of_force(np.asarray(reading.wrench), np.asarray(reading.covariance))
@@ -243,7 +271,7 @@ class LivePage:
         cut = "".join(f" Cut off along {direction_text(one)}: the joints tell too little there." for one in error.cut)
         return (
             f"{asked}{doubt}Arrow: force on the arm, {100 * self._scene.full_length:.0f} cm is {self._scale:g} N. "
-            f"Ellipsoid: where it is with 95 % probability.{cut}"
+            f"Ellipsoid: where its tip is with 95 % probability, in all directions at once; ± is 95 % along one.{cut}"
         )
 
     def _ask_for_zero(self) -> None:

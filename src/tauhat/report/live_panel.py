@@ -8,18 +8,18 @@ from html import escape
 import numpy as np
 
 from tauhat.arrays import FloatArray
-from tauhat.report.contact_log import Contact
 from tauhat.report.force_marks import SURE_ON_LINE
+from tauhat.sensing.touch import Touch
 from tauhat.sensing.wrench import Axes
 
 AXIS_COLOURS = ("#d1495b", "#2f9e62", "#3b7dd8")
 JOINT_COLOURS = ("#3b7dd8", "#d1495b", "#2f9e62", "#d39a1a", "#8250c4", "#1b9aaa", "#7a5c3e", "#c2559d")
-_STATES = {"live": "#2f9e62", "wide": "#d39a1a", "silent": "#c9483b", "waiting": "#868e96"}
+_STATES = {"live": "#2f9e62", "wide": "#d39a1a", "silent": "#c9483b", "waiting": "#868e96", "ended": "#868e96"}
 _SHOWN = 6  # contacts
 _LONGEST = 40  # letters of a name
-_COUNTS = {
-    "taken": "samples taken", "late": "late", "not_finite": "not finite", "dropped": "answers dropped",
-    "refused": "refused", "restarts": "restarts", "frozen": "frozen",
+_COUNTS = {  # one, and more
+    "taken": ("sample taken", "samples taken"), "not_finite": ("not finite", "not finite"),
+    "dropped": ("answer dropped", "answers dropped"), "restarts": ("restart", "restarts"),
 }  # fmt: skip
 STYLE = (
     "<style>.th{font:13px/1.4 system-ui,sans-serif;padding:2px 12px;font-variant-numeric:tabular-nums}"
@@ -36,7 +36,7 @@ def boxed(inner: str) -> str:
 
 
 def status_html(state: str, words: str, where: str) -> str:
-    """Return the line that says how the stream is: `live`, `wide`, `silent` or `waiting`, in words, and where it is."""
+    """Return the line that says how a stream is and where: `live`, `wide`, `silent`, `ended` or `waiting`, in words."""
     dot = f'<i style="background:{_STATES[state]};border-radius:50%"></i>'
     return boxed(
         f'<div style="display:flex;gap:12px"><span data-state="{state}">{dot}<b>{escape(words)}</b></span>'
@@ -84,13 +84,13 @@ def joints_html(names: Sequence[str], tau: FloatArray, deviation: FloatArray) ->
     return boxed(f'{head}<div class="chips">{"".join(chips)}</div>')
 
 
-def contacts_html(contacts: Sequence[Contact]) -> str:
+def contacts_html(contacts: Sequence[Touch]) -> str:
     """Return the latest contacts, the newest first."""
     if not contacts:
         return boxed('<span class="faint">No contact so far.</span>')
     rows = [
-        f"<tr><td>{_name(contact.link)}</td><td>{contact.begin:.2f}</td>"
-        f"<td>{'goes on' if contact.lasts else f'{contact.end:.2f}'}</td><td>{contact.peak:.1f}</td></tr>"
+        f"<tr><td>{_name(contact.link)}</td><td>{contact.start:.2f}</td>"
+        f"<td>{'goes on' if contact.open else f'{contact.end:.2f}'}</td><td>{contact.peak:.1f}</td></tr>"
         for contact in contacts[:_SHOWN]
     ]
     head = "<tr><th>contact</th><th>began [s]</th><th>ended [s]</th><th>peak [N]</th></tr>"
@@ -102,11 +102,17 @@ def contacts_html(contacts: Sequence[Contact]) -> str:
 
 def counts_html(counts: Mapping[str, int]) -> str:
     """Return what became of the samples."""
-    words = [f"{int(value):,} {_COUNTS.get(name, _name(name))}".replace(",", " ") for name, value in counts.items()]
+    words = [f"{int(value):,}".replace(",", " ") + f" {_counted(name, int(value))}" for name, value in counts.items()]
     return boxed(f'<div class="chips faint">{"".join(f"<span>{word}</span>" for word in words)}</div>')
 
 
+def _counted(name: str, value: int) -> str:
+    one, more = _COUNTS.get(name, (_name(name),) * 2)
+    return one if value == 1 else more
+
+
 def _measured(value: float, bar: float, *, digits: int = 1, sign: str = "+") -> str:
+    value = round(float(value), digits) + 0.0  # no minus before a zero
     shown = f"{value:{sign}.{digits}f} ± {bar:.{digits}f}" if bar < 1000.0 else f"{value:{sign}.{digits}f} ± {bar:.0f}"
     return shown.replace("-", "−")
 

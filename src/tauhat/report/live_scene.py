@@ -17,7 +17,7 @@ from tauhat.robots.robot import Robot
 from tauhat.robots.transforms import quaternion
 from tauhat.sensing.wrench import Axes
 
-_FORCE, _STALE, _ERROR = (190, 10, 20), (120, 120, 120), (220, 100, 0)
+_FORCE, _STALE, _ERROR = (190, 10, 20), (120, 120, 120), (130, 60, 200)  # nothing of an arm is violet
 _FULL = 0.55  # length of the arrow at full scale, in parts of the reach
 _CUT = 0.6  # largest half-axis of the ellipsoid, likewise
 _SHAFT, _HEAD, _TIP = 0.012, 0.03, 0.08  # radii and length of the arrow's head, likewise
@@ -74,6 +74,10 @@ class LiveScene:
         """
         with self._server.atomic():
             self._show_force(self._move(q), force, error, scale=scale)
+
+    def hide_force(self) -> None:
+        """Draw no force and no error: nothing is sensed any more."""
+        self._arrow.visible = self._error.visible = False
 
     def colour(self, *, stale: bool) -> None:
         """Show the force as of now, or as of long ago."""

@@ -94,7 +94,7 @@ def _contacts(judged: JudgedLog, index: int) -> Section:
     told = "Nothing touched the arm." if not events else f"{len(events)} contacts." if len(events) > 1 else "1 contact."
     known = (
         f"Thresholds were learnt on {found.seconds.sum():.0f} s of free motion, which can promise {found.promised:.3g} "
-        f"false contacts an hour; {found.rate:g} were asked for."
+        f"false contacts an hour; asked for: {found.rate:g}."
         if found.seconds.any() else "No free motion was given, so nothing is known of false contacts."
     )  # fmt: skip
     if found.error is not None and found.error.is_learnt:

@@ -153,7 +153,7 @@ class ContactDetector:
             )
         excess, condition, fast = judge(self._scaling, self._way, sensed, settled, after)
         contact = bool(after.state[0])
-        link = self._link(after.rows[1]) if contact else None
+        link = self.link_of(after.rows[1]) if contact else None
         zero = read_only(after.rows[0].copy())
         return after, ContactSample(contact, float(excess), CONDITIONS[condition], bool(fast), link, zero)
 
@@ -185,6 +185,16 @@ class ContactDetector:
         """Pass where the thresholds are of these joints; see `ContactThresholds.check_joints`."""
         self.thresholds.check_joints(names, where=where)
 
+    def link_of(self, told: FloatArray) -> str:
+        """Return the link, by its joint furthest out that feels at least what keeps a contact.
+
+        Parameters
+        ----------
+        told : (n_v,) residual of each joint in parts of its threshold, of a sample or the largest of a contact
+        """
+        felt = np.flatnonzero(told >= self.thresholds.rules.release)
+        return self.thresholds.joint_names[int(felt[-1]) if felt.size else int(told.argmax())]
+
     def _event(self, log: SensedLog, out: FloatArray, told: FloatArray, zero: FloatArray, span: slice) -> ContactEvent:
         top = span.start + int(out[span, 1].argmax())
         before = max(0, span.start - round(_BEFORE / log.step))
@@ -192,13 +202,8 @@ class ContactDetector:
         sizes = np.linalg.norm(force, axis=1)
         at = int(sizes.argmax())
         return ContactEvent(
-            start=float(log.t[span.start]), end=float(log.t[span.stop - 1]), link=self._link(told[span].max(axis=0)),
+            start=float(log.t[span.start]), end=float(log.t[span.stop - 1]), link=self.link_of(told[span].max(axis=0)),
             peak=float(sizes[at]), peak_std=float(log.force_std(force, span)[at]),
             excess=float(out[top, 1]),
             torque=log.tau[top] - zero[top], fast=bool(out[span, 3].any()), open=bool(span.stop == log.n_t),
         )  # fmt: skip
-
-    def _link(self, told: FloatArray) -> str:
-        """Return the joint furthest out that feels at least what keeps a contact."""
-        felt = np.flatnonzero(told >= self.thresholds.rules.release)
-        return self.thresholds.joint_names[int(felt[-1]) if felt.size else int(told.argmax())]

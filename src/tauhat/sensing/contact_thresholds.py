@@ -380,7 +380,7 @@ def _warn(found: ContactThresholds) -> None:
     if not found.keeps_rate:
         warnings.warn(
             f"{found.seconds.sum():.0f} s of free motion can promise {found.promised:.0f} false alarms an hour, "
-            f"{found.rate:g} were asked for: thresholds are {found.rules.margin:g} x the largest residual; "
+            f"asked for: {found.rate:g}; thresholds are {found.rules.margin:g} x the largest residual; "
             "give more recordings without contact",
             TauhatWarning,
             stacklevel=3,

@@ -123,7 +123,7 @@ def run(options: Options) -> None:
         sys.stdout.flush()
 
     totals = serve(service, channels, started=started)
-    say("done", counted({name.replace("_", " "): count for name, count in totals.items()}, none="nobody came"))
+    say("done", counted({_called(name, count): count for name, count in totals.items()}, none="nobody came"))
 
 
 def _source(options: Options) -> UniversalRobot | None:
@@ -165,6 +165,11 @@ def _channels(options: Options, source: UniversalRobot | None) -> Channels:
     websocket = _WEBSOCKET if options.websocket is None and alone else options.websocket
     access = Access(host=options.host, token=token)
     return Channels(websocket=websocket, udp=options.udp, pipe=options.pipe, robot=source, access=access)
+
+
+def _called(name: str, count: int) -> str:
+    """Return what a count of the end is called: nouns in their number, the rest as they are."""
+    return name[:-1] if count == 1 and name in {"clients", "restarts"} else name.replace("_", " ")
 
 
 def _page(known: Prepared, access: Access, port: int) -> Page:

@@ -46,5 +46,5 @@ def worth(thresholds: ContactThresholds) -> str:
         return f"thresholds allow {thresholds.rate:g} false ones an hour."
     return (
         f"{thresholds.seconds.sum():.0f} s of free motion can promise {number(thresholds.promised)} false ones "
-        f"an hour, {thresholds.rate:g} were asked for."
+        f"an hour; asked for: {thresholds.rate:g}."
     )

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tauhat.arrays import check_fields
 from tauhat.errors import SimulationError
 
 _HOUR = 3600.0  # [s]
-_SIGNED = ("offset", "drift")
+_SIGNED, _OR_ZERO = ("offset", "drift"), ("noise", "offset_spread", "walk")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,10 +31,7 @@ class LoadCell:
     walk: float = 0.2
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if not np.isfinite(value) or (value < 0.0 and item.name not in _SIGNED):
-                raise SimulationError(f"load cell, {item.name}", expected="a finite number, not negative", got=value)
+        check_fields(self, error=SimulationError, name="load cell", or_zero=_OR_ZERO, signed=_SIGNED)
 
     def drawn(self, rng: np.random.Generator) -> LoadCell:
         """Return one cell, its offset drawn."""

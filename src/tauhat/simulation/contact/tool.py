@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from tauhat.arrays import FloatArray
+from tauhat.arrays import FloatArray, check_fields
 from tauhat.errors import SimulationError
 from tauhat.robots.robot import Frame, Robot
 from tauhat.simulation.attached import AttachedBody
@@ -36,11 +36,7 @@ class CompliantTool:
     tip_radius: float = 0.01
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            least = "a number >= 0" if item.name == "damping" else "a positive number"
-            if not (np.isfinite(value) and value >= 0.0 and (value > 0.0 or item.name == "damping")):
-                raise SimulationError(f"compliant tool, {item.name}", expected=least, got=value)
+        check_fields(self, error=SimulationError, name="compliant tool", or_zero=("damping",))
         if self.length < self.tip_radius:
             raise SimulationError(
                 "compliant tool, length", expected=f"at least the radius of the tip, {self.tip_radius:g} m",
