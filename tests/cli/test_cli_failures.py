@@ -323,7 +323,7 @@ def test_whoever_leaves_a_socket_is_an_error_there_and_ends_no_program() -> None
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is full")
-@pytest.mark.parametrize("words", [("robots",), ("robots", "--json")])
+@pytest.mark.parametrize("words", [("robots",), ("robots", "--json"), ("--help",), ("--version",), ()])
 def test_an_output_that_is_full_is_one_line(words: tuple[str, ...]) -> None:
     command = [sys.executable, "-m", "tauhat", *words]
     with Path("/dev/full").open("w") as full:

@@ -17,6 +17,7 @@ from live_server import LOG, MESSAGES, RATE, SENSOR, SERVICE, THRESHOLDS
 
 from tauhat.errors import LiveError, SensingError
 from tauhat.live import Feed, Limits, Service, Session, Snapshot
+from tauhat.live.clients import Clients
 from tauhat.live.followers import Followers
 from tauhat.live.outbox import Outbox
 from tauhat.live.protocol import AnswerForm
@@ -173,6 +174,22 @@ def test_a_zero_without_samples_says_that_nothing_was_zeroed():
     session.receive(MESSAGES[0].encode(), 0.0)
     assert session.command("zero")
     assert len(emptied(outbox)[-1]["tau_ext"]) == 7
+
+
+def test_a_follower_is_told_that_a_robot_that_has_left_or_not_come_is_not_zeroed():
+    clients = Clients(SERVICE)
+    clients.followers.robot = "ur://robot"
+    robot, follower = (clients.admit(kind, 0.0, hang_up=int) for kind in ("robot", "pipe"))
+    follower.session.receive(b'{"command": "follow"}', 0.0)
+    follower.session.receive(b'{"command": "zero"}', 0.0)
+    robot.session.receive(MESSAGES[0].encode(), 0.0)
+    follower.session.receive(b'{"command": "zero"}', 0.0)
+    clients.leave(robot)
+    told = len(robot.outbox)
+    follower.session.receive(b'{"command": "zero"}', 0.0)
+    _, *notices = emptied(follower.outbox)
+    assert [(notice["tau_ext"], notice["why"]) for notice in notices] == [(None, "no samples of the robot come")] * 2
+    assert len(robot.outbox) == told == 2
 
 
 def test_a_session_without_a_robot_to_follow_says_so():

@@ -204,6 +204,40 @@ def test_another_rate_is_refused_however_its_stamps_jitter_and_what_is_lost(fact
         streamed(t, Q[left], TAU[left])
 
 
+@pytest.mark.parametrize("rate", [450.0, 550.0])
+def test_another_rate_in_whole_milliseconds_or_with_pauses_is_refused(rate):
+    """Most stamps are then 2 ms apart, or whole periods; what lies between the others is not."""
+    t = np.arange(T.size) / rate
+    paused = t + 0.0011 * (np.arange(T.size) // 50) + 100.0 * (np.arange(T.size) // 50)
+    jittered = t + 0.2 / rate * np.random.default_rng(1).uniform(-1.0, 1.0, T.size)
+    for stamps in (np.round(t, 3), paused, jittered):
+        with pytest.raises(SensingError, match="samples of another rate"):
+            streamed(stamps[:101], Q[:101], TAU[:101])
+
+
+@pytest.mark.parametrize("rate", [500.0, 240.0, 100.3])
+@pytest.mark.parametrize("lost", [0.0, 0.3])
+def test_stamps_in_whole_milliseconds_are_of_their_rate_whatever_is_lost(rate, lost):
+    t = np.round(np.arange(T.size) / rate, 3)[kept(lost)]
+    ForceSensor(model=MODEL, rate=rate).check_rate(t[:101], where="stream")
+
+
+@pytest.mark.parametrize("rate", [600.0, 700.0, 800.0, 900.0])
+def test_a_rate_whose_period_is_between_one_millisecond_and_two_is_told_by_whole_milliseconds(rate):
+    t = np.round(np.arange(T.size) / rate, 3)
+    sensor, *others = (ForceSensor(model=MODEL, rate=given) for given in (rate, 0.5 * rate, 2.0 * rate))
+    sensor.check_rate(t[:101], where="stream")
+    for other in others:
+        with pytest.raises(SensingError, match="samples of another rate"):
+            other.check_rate(t[:101], where="stream")
+
+
+def test_stamps_that_jitter_by_half_a_period_are_of_their_rate():
+    for seed in range(100):
+        t = T[:101] + np.random.default_rng(seed).uniform(-0.5, 0.5, 101) / RATE
+        SENSOR.check_rate(t, where="stream")
+
+
 def test_gaps_and_a_clock_that_is_set_back_are_not_another_rate():
     t = T + 0.05 * (np.arange(T.size) // 7) - 100.0 * (np.arange(T.size) >= 500)
     counts = streamed(t, Q, TAU)[0].counts

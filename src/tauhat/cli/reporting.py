@@ -23,6 +23,11 @@ FAILED = 1  # exit status of every error that is not one of usage
 class ReportingGroup(TyperGroup):
     """The command group whose commands fail in one line."""
 
+    def make_context(self, *arguments: Any, **settings: Any) -> Any:
+        """Read the command line, and print help or version where they are asked for."""
+        with one_line_reports():
+            return super().make_context(*arguments, **settings)
+
     def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]
         """Run the command chosen on the command line."""
         with one_line_reports():

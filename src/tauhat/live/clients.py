@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from tauhat.errors import LiveError
-from tauhat.live.followers import Followers
+from tauhat.live.followers import Followers, nobody
 from tauhat.live.limits import Limits
 from tauhat.live.outbox import Outbox
 from tauhat.live.service import Service
@@ -106,6 +106,8 @@ class Clients:
     def leave(self, client: Client) -> None:
         """Forget a client; what it streamed is gone with its session."""
         self.followers.leave(client.outbox)
+        if self.followers.command == client.session.command:
+            self.followers.command = nobody
         if client in self._clients:
             self._clients.remove(client)
             self.totals.update(client.session.counts)

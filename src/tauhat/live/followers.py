@@ -10,6 +10,11 @@ from tauhat.live.protocol import notice_text
 _ANSWER = '{"t"'
 
 
+def nobody(_: str) -> bool:
+    """Zero nothing, where there is no robot's stream."""
+    return False
+
+
 class Followers:
     """Who is told what is said of the robot; a follower that reads slowly holds up nobody.
 
@@ -23,7 +28,7 @@ class Followers:
     def __init__(self) -> None:
         self.robot: str | None = None
         self.state = ""
-        self.command: Callable[[str], bool] = lambda _: False
+        self.command: Callable[[str], bool] = nobody
         self._outboxes: set[Outbox] = set()
 
     def __contains__(self, outbox: Outbox) -> bool:

@@ -108,7 +108,7 @@ class Session:
             return
         followers = self._followers
         if followers is not None and self._outbox in followers and self._last is None:
-            done, why = followers.command(name), "no sample of the robot has come yet"
+            done, why = followers.command(name), "no samples of the robot come"
         else:
             done, why = self.command(name), "you have sent no samples, and do not follow the robot"
         if not done:

@@ -37,6 +37,9 @@ _CHUNK = 2**16  # [samples] between which Python may be interrupted
 _NO_LAG = read_only(np.zeros(1))
 _HALF = 0.5  # period that a stamp may be late
 _MOST, _SINGLE = 0.75, 0.05  # of the steps that have to be whole multiples, and single ones, where samples are lost
+_NO_GAP = 2.5  # periods that two stamps may be apart, early and late by most of one, with no sample between them
+_TELLING = 10.0  # periods: half a one more or less of longer steps is within `OFF_RATE`
+_TIE = 0.05  # period that a step is from one and a half, say: it is as well one as two
 _ORDINARY = 0.25  # of the median: two steps further off hold a lost sample, or one that is late
 
 
@@ -271,7 +274,8 @@ class ForceSensor:
             when samples come at another rate.
         """
         usual = usual_step(t)
-        if any(abs(step * self.rate - 1.0) <= OFF_RATE for step in (usual, step_between_gaps(t, self.step))):
+        steps = usual, step_without_gaps(t, self.step), step_between_gaps(t, self.step)
+        if any(abs(step * self.rate - 1.0) <= OFF_RATE for step in steps):
             return
         raise SensingError(
             "samples of another rate", where=where, expected=f"{self.rate:.6g} Hz within {100 * OFF_RATE:.0f} %",
@@ -326,6 +330,15 @@ def usual_step(t: FloatArray) -> float:
     return float(steps[np.abs(steps - middle) <= _ORDINARY * middle].mean())
 
 
+def step_without_gaps(t: FloatArray, near: float) -> float:
+    """Return the mean step, however stamps jitter or are rounded, where none is as long as a gap [s]; else zero."""
+    steps = np.diff(t[np.isfinite(t)])
+    steps = steps[steps != 0.0]
+    if not steps.size or steps.min() < 0.0 or steps.max() > _NO_GAP * near:
+        return 0.0
+    return float(steps.mean())
+
+
 def step_between_gaps(t: FloatArray, near: float) -> float:
     """Return the step near one that is expected, of which the times between samples are whole multiples [s].
 
@@ -333,13 +346,14 @@ def step_between_gaps(t: FloatArray, near: float) -> float:
     it is the expected one over a whole number: then hardly a step is single. Zero where there is none.
     """
     steps = np.diff(t[np.isfinite(t)])
-    steps = steps[steps > 0.0]
-    periods = np.maximum(1.0, np.round(steps / near))
-    whole = np.abs(steps - periods * near) <= _ORDINARY * near  # one of two, where it is by chance
-    single = np.count_nonzero(whole & (periods == 1.0))
+    steps = steps[(steps > 0.0) & (steps <= _TELLING * near)]
+    fewer, more = (np.maximum(1.0, np.round(steps / near + side)) for side in (-_TIE, _TIE))
+    whole = np.abs(steps - more * near) <= _ORDINARY * near  # one of two, where it is by chance
+    single = np.count_nonzero(whole & (more == 1.0))
     if np.count_nonzero(whole) < _MOST * steps.size or single <= _SINGLE * steps.size:
         return 0.0
-    return float(steps[whole].sum() / periods[whole].sum())
+    found = (float(steps.sum() / periods.sum()) for periods in (fewer, more))  # of all: whole ones are near by choice
+    return max(found, key=lambda step: abs(step - near))
 
 
 def counted(codes: IntArray) -> SampleCounts:

@@ -7,8 +7,8 @@ What becomes of a sample:
     later than that                               taken, and everything starts again with wide error bars
     the same to the bit as those before it        taken; counted as `frozen` from ten in a row on
 Stamps are believed or counted as whole periods, as positions tell (see `stamp_kernel`). The rate is judged over 100
-samples at a time: the usual step has to be the sensor's within 5 %, or, where many samples are lost, the one of which
-the steps are whole multiples.
+samples at a time: the usual step has to be the sensor's within 5 %, or the mean one where there are no gaps, or, where
+many samples are lost, the one of which the steps are whole multiples.
 """
 
 from __future__ import annotations

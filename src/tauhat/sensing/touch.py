@@ -17,7 +17,7 @@ class Touch(NamedTuple):
     number : along the stream, from one on
     link : the link that is touched, or one further out: as of `ContactEvent`, by all samples so far
     start, end : time stamps of its first and its latest sample [s]
-    peak : largest force meanwhile [N]
+    peak : largest force meanwhile, as it is told: not less that before the start, as `ContactEvent.peak` is [N]
     open : whether it goes on
     """
 
