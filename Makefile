@@ -15,7 +15,7 @@ demo: $(STAMP)
 	$(BIN)/tauhat demo
 
 test: $(STAMP)
-	$(BIN)/pytest -n auto
+	$(BIN)/pytest -n auto --dist loadfile
 
 lint: $(STAMP)
 	$(BIN)/ruff format --check src tests benchmarks examples docs/site
