@@ -78,6 +78,11 @@ class Stream:
             self.read()
         if now - self.heard_at > QUIET or not self.connection.is_open:
             self.totals["streams_broken"] += 1
+            print(
+                f"broken: {'slow ' * self.slow}{self.address}, open {self.connection.is_open}, no answer for "
+                f"{now - self.heard_at:.1f} s; sent {self.sent}, answered {self.answered}, dropped {self.dropped}, waiting {self.connection.waiting}",
+                file=sys.stderr,
+            )
             self.end()
             self.open()
 

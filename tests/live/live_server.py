@@ -63,6 +63,7 @@ class Running:
     addresses: dict[str, str]
     server: LiveServer
     complaints: list[Any]
+    loop: asyncio.AbstractEventLoop
 
     def port(self, channel: str) -> int:
         return int(self.addresses[channel].strip("/").rpartition(":")[2])
@@ -99,7 +100,7 @@ def running(
 
     async def serve() -> None:
         async with LiveServer(given, channels) as server:
-            found.append(Running(dict(server.addresses), server, complaints))
+            found.append(Running(dict(server.addresses), server, complaints, loop))
             ready.set()
             await ended.wait()
 

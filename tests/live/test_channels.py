@@ -6,6 +6,7 @@ import asyncio
 import json
 import socket
 import stat
+import threading
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -280,6 +281,24 @@ def test_who_is_silent_for_too_long_is_let_go(tmp_path: Path):
         for sender in senders:
             sender.close()
         assert served.serves("websocket")
+
+
+def test_a_server_that_stood_still_blames_nobody_for_silence(tmp_path: Path):
+    with running(tmp_path, limits=Limits(idle=0.4)) as served:
+        senders = [Sender(served.addresses[channel]) for channel in CHANNELS]
+        for sender in senders:
+            sender.command("counts")
+        wait_until(lambda: len(served.server.clients) == 3)
+        goes_on = threading.Event()
+        served.loop.call_soon_threadsafe(time.sleep, 1.5)
+        served.loop.call_soon_threadsafe(goes_on.set)
+        assert goes_on.wait(10.0)
+        time.sleep(0.1)
+        for sender in senders:
+            sender.command("counts")
+        for sender in senders:
+            wait_until(lambda sender=sender: [*sender.answers(0.05), len(sender.notices) == 2][-1])
+            sender.close()
 
 
 @pytest.mark.parametrize("channel", CHANNELS)

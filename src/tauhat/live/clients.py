@@ -123,10 +123,18 @@ class Clients:
                     client.session.command(name)
 
     async def watch(self) -> None:
-        """Let go, until cancelled, of clients that have been silent for too long; who follows need not say anything."""
+        """Let go, until cancelled, of clients that have been silent for too long; who follows need not say anything.
+
+        Where the server itself stood still, as on a machine that was stopped, nobody is blamed: what was said meanwhile
+        still waits to be heard.
+        """
         loop, idle = asyncio.get_running_loop(), self.service.limits.idle
+        pause = min(1.0, idle / 4.0)
         while True:
-            await asyncio.sleep(min(1.0, idle / 4.0))
-            for client in [one for one in self._clients if loop.time() - one.heard > idle]:
-                if client.outbox not in self.followers:
+            begun = loop.time()
+            await asyncio.sleep(pause)
+            now = loop.time()
+            for client in list(self._clients):
+                client.heard = min(now, client.heard + max(0.0, now - begun - pause))
+                if now - client.heard > idle and client.outbox not in self.followers:
                     client.hang_up()
