@@ -29,7 +29,7 @@ from live_server import (
 )
 
 from tauhat.errors import LiveError
-from tauhat.live import Access, Channels, Limits, LiveServer, Sender, Service
+from tauhat.live import Access, Channels, Limits, LiveServer, Sender, Service, connection
 from tauhat.live.connection import Connection, connect
 from tauhat.recordings import Log
 
@@ -281,6 +281,12 @@ def test_who_is_silent_for_too_long_is_let_go(tmp_path: Path):
         for sender in senders:
             sender.close()
         assert served.serves("websocket")
+
+
+def test_a_server_that_accepts_and_says_nothing_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(connection, "_OPENING", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as silent, pytest.raises(LiveError, match="no answer to the handshake"):
+        Sender(f"ws://127.0.0.1:{silent.getsockname()[1]}/")
 
 
 def test_a_server_that_stood_still_blames_nobody_for_silence(tmp_path: Path):

@@ -194,7 +194,7 @@ class WebSocketConnection(Connection):
 
     def close(self) -> None:
         """Say that it ends, and end it."""
-        if self.is_open:
+        if self.is_open and self._protocol.state.name != "CONNECTING":
             self._protocol.send_close()
             self._outward += self._drained()
             self._push()
@@ -208,7 +208,9 @@ class WebSocketConnection(Connection):
             self._early += super().exchange(0.1)
         if self._protocol.handshake_exc is not None or self._protocol.state.name == "CONNECTING":
             self.close()
-            raise LiveError("the server refused the handshake", where=address, got=self._protocol.handshake_exc)
+            refusal = self._protocol.handshake_exc
+            what = "no answer to the handshake" if refusal is None else "the server refused the handshake"
+            raise LiveError(what, where=address, got=refusal)
 
     def _framed(self, text: str) -> bytes:
         if self._protocol.state.name == "OPEN":  # else nobody listens; what was said before can still be read

@@ -126,9 +126,11 @@ async def serve_websocket(clients: Clients, access: Access, *, port: int) -> tup
 async def _closed(connection: ServerConnection) -> None:
     """Close a connection; what its client still says is read past, since its farewell comes behind that."""
     closing = asyncio.ensure_future(connection.close())
-    with suppress(ConnectionClosed):
-        while True:
-            await connection.recv(decode=False)
+    with suppress(ConnectionClosed, TimeoutError):
+        async with asyncio.timeout(_FAREWELL):
+            while True:
+                await connection.recv(decode=False)
+    connection.transport.abort()
     await closing
 
 
