@@ -34,8 +34,8 @@ from tauhat.estimation import (
     WeightedLeastSquares,
     consistent,
 )
+from tauhat.estimation.block import Block
 from tauhat.estimation.consistency_problem import ConsistencyProblem, consistency_problem
-from tauhat.estimation.evidence import Block
 from tauhat.estimation.physical import solve_consistency
 from tauhat.estimation.pseudo_inertia import BASIS, SIZE
 from tauhat.robots import load_robot

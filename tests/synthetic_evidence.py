@@ -10,7 +10,7 @@ import numpy as np
 from tauhat.dynamics import BaseParameters, TorqueModel, base_parameters, torque_model
 from tauhat.dynamics.base import random_motion
 from tauhat.estimation import Evidence
-from tauhat.estimation.evidence import Block
+from tauhat.estimation.block import Block
 from tauhat.robots import Robot, load_robot
 from tauhat.simulation.parameters import perturbed
 

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tauhat.estimation.block import Block
 from tauhat.estimation.block_merging import thinned
-from tauhat.estimation.evidence import MOST_BLOCKS, Block, Evidence
+from tauhat.estimation.evidence import MOST_BLOCKS, Evidence
 
 
 def evidence(log: int, blocks: int, length: int) -> Evidence:

@@ -14,8 +14,8 @@ from tauhat.arrays import FloatArray
 from tauhat.dynamics import BaseParameters, Motion, base_parameters
 from tauhat.errors import ModelError
 from tauhat.estimation import Evidence, OrdinaryLeastSquares, WeightedLeastSquares, collect
+from tauhat.estimation.block import Block
 from tauhat.estimation.essential import EssentialParameters, essential_parameters
-from tauhat.estimation.evidence import Block
 from tauhat.recordings.processing import Processing
 
 SETTINGS = Processing(cutoff=10.0, motion_cutoff=30.0)

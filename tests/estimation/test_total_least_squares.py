@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 
 from tauhat.errors import ModelError
 from tauhat.estimation import Evidence, OrdinaryLeastSquares, TotalLeastSquares, WeightedLeastSquares
-from tauhat.estimation.evidence import Block
+from tauhat.estimation.block import Block
 from tauhat.estimation.total_least_squares import Scales, total_covariance, total_fit
 
 TRUE = np.array([1.0, -2.0, 0.5, 3.0])

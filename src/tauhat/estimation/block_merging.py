@@ -16,10 +16,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import reduce
 from hashlib import sha256
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    from tauhat.estimation.evidence import Block
+from tauhat.estimation.block import Block
 
 _LOT = "\0"  # begins the name of what was thrown together; the bits follow
 _BITS = 32

@@ -27,9 +27,10 @@ import numpy as np
 from tauhat.arrays import FloatArray, IntArray, frozen
 from tauhat.blas import single_threaded
 from tauhat.errors import ModelError
+from tauhat.estimation.block import Block
 from tauhat.estimation.confidence import student_quantile
 from tauhat.estimation.estimate import Estimate
-from tauhat.estimation.evidence import Block, Evidence, collect_all
+from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.gain_fit import Jackknifed, jackknifed, ordinary_solution, total_solution
 from tauhat.estimation.loaded_run import TEN, PayloadColumns, payload_columns
 from tauhat.estimation.payload_fit import PayloadProblem, fit_payload

@@ -30,7 +30,8 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.dynamics.model import Layout
 from tauhat.errors import ModelError
-from tauhat.estimation.evidence import Block, Evidence, evidence_from_rows
+from tauhat.estimation.block import Block
+from tauhat.estimation.evidence import Evidence, evidence_from_rows
 from tauhat.estimation.least_squares import degrees_of_freedom
 from tauhat.estimation.rows import Rows
 from tauhat.estimation.simulated_runs import SimulatedRuns, joined

@@ -14,8 +14,9 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.dynamics.model import TorqueModel
+from tauhat.estimation.block import Block
 from tauhat.estimation.estimate import Estimate, input_log
-from tauhat.estimation.evidence import Block, Evidence, collect_all
+from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.least_squares import WeightedLeastSquares
 from tauhat.estimation.loaded_run import TEN, PayloadColumns, loaded_model
 from tauhat.estimation.solution import Solution, joint_residuals, joint_torques, weighted_rows

@@ -27,7 +27,8 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray
 from tauhat.errors import ModelError
-from tauhat.estimation.evidence import Block, Evidence
+from tauhat.estimation.block import Block
+from tauhat.estimation.evidence import Evidence
 from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows, degrees_of_freedom
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.repeated_rows import RepeatedRows, repeated_rows

@@ -24,7 +24,8 @@ import numpy as np
 
 from tauhat.arrays import FloatArray
 from tauhat.errors import ModelError
-from tauhat.estimation.evidence import Block, Evidence, collect_all
+from tauhat.estimation.block import Block
+from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, check_rows, degrees_of_freedom
 from tauhat.estimation.losses import Bisquare, Cauchy, Huber, Loss
 from tauhat.estimation.problem import Problem

@@ -23,7 +23,8 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, IntArray, read_only
 from tauhat.errors import ModelError
-from tauhat.estimation.evidence import Block, Evidence
+from tauhat.estimation.block import Block
+from tauhat.estimation.evidence import Evidence
 from tauhat.estimation.filters.outcome import Recursion
 from tauhat.estimation.friction import braking_parameters
 from tauhat.estimation.least_squares import Estimator, Solved, WeightedLeastSquares, diagnosed

@@ -22,7 +22,8 @@ from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.motion import Motion
 from tauhat.dynamics.terms import Parameter, Shaped, Term
-from tauhat.estimation.evidence import Block, Evidence
+from tauhat.estimation.block import Block
+from tauhat.estimation.evidence import Evidence
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.rotor_load import RotorLoad, rotor_load
 from tauhat.estimation.solution import Solution, honest_covariance, joint_residuals, solve

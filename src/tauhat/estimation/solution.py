@@ -21,7 +21,8 @@ import numpy as np
 
 from tauhat.arrays import FloatArray, read_only
 from tauhat.errors import ModelError
-from tauhat.estimation.evidence import Block, Evidence
+from tauhat.estimation.block import Block
+from tauhat.estimation.evidence import Evidence
 
 RANK = 1e-10  # singular values below this part of the largest are taken as zero
 _SILENT = 1e-9  # a column below this part of the largest is rounding of a constant position, not motion

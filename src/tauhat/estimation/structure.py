@@ -19,7 +19,8 @@ from tauhat.arrays import FloatArray, IntArray
 from tauhat.blas import single_threaded
 from tauhat.dynamics.base import base_parameters
 from tauhat.dynamics.model import TERMS, TorqueModel
-from tauhat.estimation.evidence import Block, Evidence, collect_all
+from tauhat.estimation.block import Block
+from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.iterating import iterated
 from tauhat.estimation.least_squares import Estimator, WeightedLeastSquares
 from tauhat.estimation.rows import check_recordings
