@@ -49,11 +49,14 @@ from tauhat.recordings import Recording, read_recording
 from tauhat.robots import Robot, load_robot
 from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
 from tauhat.sensing.contact import ContactDetector, ContactEvent
-from tauhat.sensing.contact_thresholds import ContactRules, ContactThresholds, thresholds_of
+from tauhat.sensing.contact_rules import ContactRules
+from tauhat.sensing.contact_thresholds import ContactThresholds
 from tauhat.sensing.observers import OBSERVERS, Observer, observer_named
 from tauhat.sensing.payload_check import check_payload
+from tauhat.sensing.sample_rate import usual_step
 from tauhat.sensing.sensed_log import SensedLog
-from tauhat.sensing.sensor import STAMPS, Stamps, force_sensor, usual_step
+from tauhat.sensing.sensor import STAMPS, Stamps, force_sensor
+from tauhat.sensing.threshold_learning import thresholds_of
 from tauhat.sensing.wrench import WrenchSolver, directions_named
 from tauhat.sensing.zero import NO_ZERO, StandingZero, zeroed
 

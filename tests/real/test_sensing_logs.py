@@ -18,7 +18,8 @@ from tauhat.estimation.estimate import Estimate
 from tauhat.recordings import Recording
 from tauhat.sensing import WrenchSolver, directions_named, observer_named
 from tauhat.sensing.contact import ContactDetector
-from tauhat.sensing.contact_thresholds import ContactRules, ContactThresholds
+from tauhat.sensing.contact_rules import ContactRules
+from tauhat.sensing.contact_thresholds import ContactThresholds
 from tauhat.sensing.zero import zeroed
 
 BENCHMARKS = str(Path(__file__).parents[2] / "benchmarks")

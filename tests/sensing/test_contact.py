@@ -14,16 +14,12 @@ from sensed_arms import frictionless, motion
 from tauhat.errors import ArrayError, SensingError, TauhatWarning
 from tauhat.recordings import Recording
 from tauhat.sensing.contact import ContactDetector, Contacts
-from tauhat.sensing.contact_thresholds import (
-    ContactRules,
-    ContactThresholds,
-    learn_contact_thresholds,
-    load_contact_thresholds,
-    thresholds_of,
-)
+from tauhat.sensing.contact_rules import ContactRules
+from tauhat.sensing.contact_thresholds import ContactThresholds, load_contact_thresholds
 from tauhat.sensing.payload_check import check_payload
 from tauhat.sensing.sensed_log import SampleCounts, SensedLog
 from tauhat.sensing.sensor import ForceSensor
+from tauhat.sensing.threshold_learning import learn_contact_thresholds, thresholds_of
 from tauhat.sensing.wrench import WrenchSolver
 from tauhat.sensing.zero import NO_ZERO, AirPass, StandingZero, air_pass, zeroed
 

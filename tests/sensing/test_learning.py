@@ -17,13 +17,14 @@ from tauhat.estimation import identify, load_estimate
 from tauhat.recordings import Recording
 from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
 from tauhat.sensing.contact_rules import ContactRules
-from tauhat.sensing.contact_thresholds import ContactThresholds, learn_contact_thresholds, load_contact_thresholds
+from tauhat.sensing.contact_thresholds import ContactThresholds, load_contact_thresholds
 from tauhat.sensing.free_logs import sensed_free, settled_seconds
 from tauhat.sensing.free_motion import learnt_from_free_motion
 from tauhat.sensing.learnt_error import LearntError, error_of
 from tauhat.sensing.observers import observer_named
 from tauhat.sensing.sensed_model import sensed_model
 from tauhat.sensing.sensor import ForceSensor, force_sensor
+from tauhat.sensing.threshold_learning import learn_contact_thresholds
 from tauhat.sensing.wrench import WrenchSolver
 
 MODEL = frictionless()

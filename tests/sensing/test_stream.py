@@ -14,7 +14,7 @@ from tauhat.recordings import Recording
 from tauhat.recordings.log import Log
 from tauhat.sensing import ForceSensor, SensedLog, SensorStream, StreamMemory
 from tauhat.sensing.sample_lines import read_samples
-from tauhat.sensing.sensor import usual_step
+from tauhat.sensing.sample_rate import check_rate, usual_step
 
 RATE = 500.0
 MODEL = frictionless("ur5e")
@@ -219,23 +219,22 @@ def test_another_rate_in_whole_milliseconds_or_with_pauses_is_refused(rate):
 @pytest.mark.parametrize("lost", [0.0, 0.3])
 def test_stamps_in_whole_milliseconds_are_of_their_rate_whatever_is_lost(rate, lost):
     t = np.round(np.arange(T.size) / rate, 3)[kept(lost)]
-    ForceSensor(model=MODEL, rate=rate).check_rate(t[:101], where="stream")
+    check_rate(t[:101], rate, where="stream")
 
 
 @pytest.mark.parametrize("rate", [600.0, 700.0, 800.0, 900.0])
 def test_a_rate_whose_period_is_between_one_millisecond_and_two_is_told_by_whole_milliseconds(rate):
     t = np.round(np.arange(T.size) / rate, 3)
-    sensor, *others = (ForceSensor(model=MODEL, rate=given) for given in (rate, 0.5 * rate, 2.0 * rate))
-    sensor.check_rate(t[:101], where="stream")
-    for other in others:
+    check_rate(t[:101], rate, where="stream")
+    for other in (0.5 * rate, 2.0 * rate):
         with pytest.raises(SensingError, match="samples of another rate"):
-            other.check_rate(t[:101], where="stream")
+            check_rate(t[:101], other, where="stream")
 
 
 def test_stamps_that_jitter_by_half_a_period_are_of_their_rate():
     for seed in range(100):
         t = T[:101] + np.random.default_rng(seed).uniform(-0.5, 0.5, 101) / RATE
-        SENSOR.check_rate(t, where="stream")
+        check_rate(t, SENSOR.rate, where="stream")
 
 
 def test_gaps_and_a_clock_that_is_set_back_are_not_another_rate():

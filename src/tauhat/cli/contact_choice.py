@@ -107,8 +107,8 @@ class ContactChoice:
     def _learnt(self, sensor: ForceSensor, air: AirPass | None) -> Prepared:
         from tauhat.files import check_output
         from tauhat.recordings.reading import read_log
-        from tauhat.sensing.contact_thresholds import learn_contact_thresholds
         from tauhat.sensing.learnt_error import error_of
+        from tauhat.sensing.threshold_learning import learn_contact_thresholds
 
         if self.thresholds is not None:
             check_output(self.thresholds, inputs=(*self.inputs, *self.free))

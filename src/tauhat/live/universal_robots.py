@@ -28,6 +28,7 @@ from tauhat.errors import LiveError, MissingExtraError
 from tauhat.live import rtde_reader
 from tauhat.live.current_map import CurrentMap
 from tauhat.live.rtde_greeting import Controller, greet
+from tauhat.sensing.sample_rate import check_rate
 from tauhat.sensing.sensor import ForceSensor, Sensed
 from tauhat.sensing.stream import JUDGED, SensorStream
 
@@ -180,7 +181,7 @@ class RobotLink:
 
     def check_rate_of(self, sensor: ForceSensor) -> None:
         """Refuse a sensor for another rate, by `SensingError`; the controller has agreed to its own."""
-        sensor.check_rate(np.array([0.0, 1.0 / self.rate]), where=f"{SCHEME}{self.robot.address}")
+        check_rate(np.array([0.0, 1.0 / self.rate]), sensor.rate, where=f"{SCHEME}{self.robot.address}")
 
     def close(self) -> None:
         """End the connection and what reads it."""

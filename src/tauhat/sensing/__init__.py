@@ -3,11 +3,7 @@
 from tauhat.sensing.assumed_thresholds import assumed_contact_thresholds
 from tauhat.sensing.contact import ContactDetector, ContactEvent, Contacts
 from tauhat.sensing.contact_rules import ContactRules
-from tauhat.sensing.contact_thresholds import (
-    ContactThresholds,
-    learn_contact_thresholds,
-    load_contact_thresholds,
-)
+from tauhat.sensing.contact_thresholds import ContactThresholds, load_contact_thresholds
 from tauhat.sensing.free_motion import learnt_from_free_motion
 from tauhat.sensing.hidden import Hidden, hidden_along
 from tauhat.sensing.judged_log import JudgedLog, judged_log
@@ -18,6 +14,7 @@ from tauhat.sensing.sensed_log import SampleCounts, SensedLog
 from tauhat.sensing.sensed_model import SensedModel, sensed_model
 from tauhat.sensing.sensor import ForceSensor, Sensed, force_sensor
 from tauhat.sensing.stream import SensorStream, StreamMemory
+from tauhat.sensing.threshold_learning import learn_contact_thresholds
 from tauhat.sensing.tool import Tool, load_tool
 from tauhat.sensing.torque_observer import SensedTorque, TorqueObserver
 from tauhat.sensing.wrench import DIRECTIONS, SensedWrench, WrenchSolver, directions_named

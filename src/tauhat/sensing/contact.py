@@ -18,8 +18,8 @@ from tauhat.sensing.contact_kernel import RESTING, ROWS, SETTLING, STATES, judge
 from tauhat.sensing.contact_thresholds import CONDITIONS, ContactThresholds
 from tauhat.sensing.judged_rows import judged_rows
 from tauhat.sensing.payload_check import PayloadCheck
+from tauhat.sensing.sample_rate import OFF_RATE
 from tauhat.sensing.sensed_log import SensedLog
-from tauhat.sensing.sensor import OFF_RATE
 
 _BEFORE = 0.2  # seconds before the start of a contact: what is sensed there is not its
 

@@ -16,8 +16,9 @@ from tauhat.errors import SensingError
 from tauhat.recordings.log import Log
 from tauhat.recordings.recording import Recording
 from tauhat.sensing.causal_filter import HIGHEST
+from tauhat.sensing.sample_rate import OFF_RATE, usual_step
 from tauhat.sensing.sensed_log import SensedLog
-from tauhat.sensing.sensor import OFF_RATE, ForceSensor, usual_step
+from tauhat.sensing.sensor import ForceSensor
 from tauhat.sensing.zero import AirPass, without_air
 
 _SIGNALS = ("t", "q", "dq", "ddq", "tau", "temperature", "wrench")

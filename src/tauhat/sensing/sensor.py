@@ -20,6 +20,7 @@ from tauhat.sensing.causal_filter import HIGHEST, CausalFilter
 from tauhat.sensing.frozen import frozen_along
 from tauhat.sensing.observer_kernel import DISTURBANCE
 from tauhat.sensing.observers import MomentumObserver, Observer
+from tauhat.sensing.sample_rate import check_rate
 from tauhat.sensing.sensed_log import SampleCounts, SensedLog
 from tauhat.sensing.sensed_model import SensedModel, sensed_model
 from tauhat.sensing.thermal_kernel import VARIANCE, WARMTH
@@ -31,16 +32,10 @@ Stamps: TypeAlias = Literal["auto", "exact", "jittered"]
 
 STAMPS: Mapping[str, int] = {"auto": stamp.AUTO, "exact": stamp.EXACT, "jittered": stamp.JITTERED}
 CUTOFF = 10.0  # [Hz]
-OFF_RATE = 0.05  # a clock further off than this is another one
 _BRIDGED_STEPS, _BRIDGED = 5.0, 0.02  # lost samples are put back over so many steps, or so long [s]
 _CHUNK = 2**16  # [samples] between which Python may be interrupted
 _NO_LAG = read_only(np.zeros(1))
 _HALF = 0.5  # period that a stamp may be late
-_MOST, _SINGLE = 0.75, 0.05  # of the steps that have to be whole multiples, and single ones, where samples are lost
-_NO_GAP = 2.5  # periods that two stamps may be apart, early and late by most of one, with no sample between them
-_TELLING = 10.0  # periods: half a one more or less of longer steps is within `OFF_RATE`
-_TIE = 0.05  # period that a step is from one and a half, say: it is as well one as two
-_ORDINARY = 0.25  # of the median: two steps further off hold a lost sample, or one that is late
 
 
 class Sensed(NamedTuple):
@@ -233,7 +228,7 @@ class ForceSensor:
     ) -> Iterator[tuple[FloatArray, int]]:
         """Fill results and codes window by window; yield the memory behind each, and how many samples were taken."""
         torque = _torque(self.model, log)
-        self.check_rate(log.t, where=log.name)
+        check_rate(log.t, self.rate, where=log.name)
         state, filled = self.start().copy(), 0
         for first in starts:
             window = slice(first, first + starts.step)
@@ -259,28 +254,6 @@ class ForceSensor:
             frame=str(solver.frame), axes=solver.axes, step=self.step, t=np.array(log.t[rows]), rows=rows,
             counts=counted(codes)._replace(frozen=frozen), believed=int(np.count_nonzero(results[-1])),
             **dict(zip(names, results[:-1], strict=True)),
-        )  # fmt: skip
-
-    def check_rate(self, t: FloatArray, *, where: str) -> None:
-        """Pass time stamps of the sensor's rate, within 5 %, also where many samples between are lost.
-
-        Parameters
-        ----------
-        t : time stamps [s]
-
-        Raises
-        ------
-        SensingError
-            when samples come at another rate.
-        """
-        usual = usual_step(t)
-        steps = usual, step_without_gaps(t, self.step), step_between_gaps(t, self.step)
-        if any(abs(step * self.rate - 1.0) <= OFF_RATE for step in steps):
-            return
-        raise SensingError(
-            "samples of another rate", where=where, expected=f"{self.rate:.6g} Hz within {100 * OFF_RATE:.0f} %",
-            got=f"{1.0 / usual:.6g} Hz" if usual > 0 else "time that stands still",
-            remedy="make the sensor for the rate of the samples (--rate)",
         )  # fmt: skip
 
 
@@ -311,49 +284,6 @@ def force_sensor(
         model=sensed_model(estimate), rate=rate, observer=observer or MomentumObserver(), cutoff=cutoff,
         delay=estimate.processing.delay, wrench=wrench, stamps=stamps,
     )  # fmt: skip
-
-
-def usual_step(t: FloatArray) -> float:
-    """Return the time between samples [s]: the mean over pairs of steps near their median, lost samples left out.
-
-    Pairs, since some programs stamp two samples at once. Zero where there are too few.
-    """
-    times = t[np.isfinite(t)]
-    span = min(2, times.size - 1)
-    if span < 1:
-        return 0.0
-    steps = (times[span:] - times[:-span]) / span
-    steps = steps[steps > 0.0]
-    if not steps.size:
-        return 0.0
-    middle = float(np.median(steps))
-    return float(steps[np.abs(steps - middle) <= _ORDINARY * middle].mean())
-
-
-def step_without_gaps(t: FloatArray, near: float) -> float:
-    """Return the mean step, however stamps jitter or are rounded, where none is as long as a gap [s]; else zero."""
-    steps = np.diff(t[np.isfinite(t)])
-    steps = steps[steps != 0.0]
-    if not steps.size or steps.min() < 0.0 or steps.max() > _NO_GAP * near:
-        return 0.0
-    return float(steps.mean())
-
-
-def step_between_gaps(t: FloatArray, near: float) -> float:
-    """Return the step near one that is expected, of which the times between samples are whole multiples [s].
-
-    So samples of a busy machine have one, though half of them may be lost; those of another rate have none, also where
-    it is the expected one over a whole number: then hardly a step is single. Zero where there is none.
-    """
-    steps = np.diff(t[np.isfinite(t)])
-    steps = steps[(steps > 0.0) & (steps <= _TELLING * near)]
-    fewer, more = (np.maximum(1.0, np.round(steps / near + side)) for side in (-_TIE, _TIE))
-    whole = np.abs(steps - more * near) <= _ORDINARY * near  # one of two, where it is by chance
-    single = np.count_nonzero(whole & (more == 1.0))
-    if np.count_nonzero(whole) < _MOST * steps.size or single <= _SINGLE * steps.size:
-        return 0.0
-    found = (float(steps.sum() / periods.sum()) for periods in (fewer, more))  # of all: whole ones are near by choice
-    return max(found, key=lambda step: abs(step - near))
 
 
 def counted(codes: IntArray) -> SampleCounts:

@@ -21,6 +21,7 @@ import numpy as np
 from tauhat.arrays import FloatArray
 from tauhat.sensing import stamp_kernel as stamp
 from tauhat.sensing.frozen import IN_A_ROW, newly_frozen
+from tauhat.sensing.sample_rate import check_rate
 from tauhat.sensing.sensed_log import SampleCounts
 from tauhat.sensing.sensor import ForceSensor, Sensed
 
@@ -93,7 +94,7 @@ class SensorStream:
             return ()
         if len(times) <= self.judged:
             return times
-        self.sensor.check_rate(np.array(times), where=f"{self.name}, {times[-1]:.6g} s")
+        check_rate(np.array(times), self.sensor.rate, where=f"{self.name}, {times[-1]:.6g} s")
         return times[-1:]
 
 

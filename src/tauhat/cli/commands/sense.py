@@ -151,7 +151,7 @@ def _logs(options: Options) -> list[Log]:
 
 def _rate(log: Log) -> float:
     from tauhat.errors import SensingError
-    from tauhat.sensing.sensor import usual_step
+    from tauhat.sensing.sample_rate import usual_step
 
     step = usual_step(log.t)
     if not step > 0.0:
