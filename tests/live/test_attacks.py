@@ -252,10 +252,12 @@ def test_who_says_nothing_behind_the_handshake_is_sent_away(guarded: Running):
 
 
 def test_an_address_that_has_not_said_the_token_hears_nothing_at_all(guarded: Running):
+    before = guarded.server.clients.totals["unknown_datagrams"]
     connection = connect(guarded.addresses["udp"])
     for text in (MESSAGES[0], json.dumps({"token": "x" * 30}), '{"command": "counts"}', "", "[", "x" * 9000):
         connection.send(text)
     assert connection.exchange(0.3) == []
+    assert guarded.server.clients.totals["unknown_datagrams"] == before + 6
     connection.send(json.dumps({"token": TOKEN}))
     assert json.loads(connection.exchange(2.0)[0])["hello"] == "tauhat"
     connection.close()

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import itertools
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from devtools import Tab, browsing, find_browser
 
 from tauhat.errors import LiveError
+from tauhat.live import page_process
 from tauhat.live.access import Access
 from tauhat.live.feed import Snapshot
 from tauhat.live.page_process import PageProcess, _deaf_to_interrupts, start_page
@@ -30,12 +35,12 @@ SETTLED = 0.02  # [s] between snapshots of the tests
 
 
 def snapshot(
-    t: float, *, force: float, contact: Touch | None = None, spread: float = 1.0, stream: str = "arm"
+    t: float, *, force: float, contacts: tuple[Touch, ...] = (), spread: float = 1.0, stream: str = "arm"
 ) -> Snapshot:
     covariance = np.diag([1.0, 1.0, spread**2, 0.1, 0.1, 0.1])
     return Snapshot(
         stream=stream, t=t, q=np.array([0.3, 0.4, 0.0, -1.9, 0.0, 2.2, 0.5]), tau=np.arange(7.0), tau_std=np.ones(7),
-        wrench=np.array([0.0, 0.0, force, 0.0, 0.0, 0.0]), covariance=covariance, contact=contact,
+        wrench=np.array([0.0, 0.0, force, 0.0, 0.0, 0.0]), covariance=covariance, contacts=contacts,
         counts={"taken": 1234, "late": 1},
     )  # fmt: skip
 
@@ -101,7 +106,7 @@ def test_pressing_zero_arrives_in_the_server(page, tab):
 
 def test_contacts_and_doubts_are_said(page, tab):
     touch = Touch(1, "<img src=x onerror=alert(1)>link6", 199.0, 200.0, 42.0, open=True)
-    touched = snapshot(200.0, force=42.0, contact=touch)
+    touched = snapshot(200.0, force=42.0, contacts=(touch,))
     script = "document.body.innerText.includes('onerror=alert(1)>link6') && document.body.innerText.includes('42.0')"
     shown(page, tab, script, touched)
     assert tab.evaluate("document.querySelectorAll('img[src=x]').length") == 0
@@ -109,7 +114,7 @@ def test_contacts_and_doubts_are_said(page, tab):
         page,
         tab,
         "document.body.innerText.includes('ended') && !document.body.innerText.includes('goes on')",
-        snapshot(240.0, force=0.0, contact=touch._replace(open=False)),
+        snapshot(240.0, force=0.0, contacts=(touch._replace(open=False),)),
     )
     shown(
         page,
@@ -126,7 +131,7 @@ def test_a_stream_that_ends_is_called_silent(page, tab):
 
 def test_a_client_that_leaves_ends_its_stream_and_its_contact(page, tab):
     touch = Touch(2, "link5", 320.0, 320.0, 9.0, open=True)
-    shown(page, tab, "document.body.innerText.includes('goes on')", snapshot(320.0, force=9.0, contact=touch))
+    shown(page, tab, "document.body.innerText.includes('goes on')", snapshot(320.0, force=9.0, contacts=(touch,)))
     page.end("nobody")
     page.end("arm")
     assert "the stream has ended" in tab.until("document.querySelector('[data-state=ended]')?.innerText")
@@ -170,6 +175,29 @@ def test_a_page_that_died_is_no_error(tmp_path):
         assert not page.send(snapshot(1.0, force=1.0))
         page.end("arm")
         assert page.commands() == []
+
+
+def test_a_page_that_only_says_that_it_takes_what_it_is_shown_keeps_nobody_waiting(monkeypatch):
+    seconds = itertools.count()
+    monkeypatch.setattr(page_process, "time", SimpleNamespace(monotonic=lambda: float(next(seconds))))
+    ours, theirs = multiprocessing.Pipe()
+    page = PageProcess(SimpleNamespace(is_alive=lambda: True), ours, "")
+    taken = []
+
+    def show() -> None:
+        for number in range(3000):
+            theirs.send_bytes(b"taken")
+            taken.append(page.send(snapshot(float(number), force=1.0)))
+
+    shows = threading.Thread(target=show, daemon=True)
+    shows.start()
+    shows.join(timeout=20.0)
+    assert not shows.is_alive()
+    assert taken[:10] == [True] * 10
+    assert not any(taken[-1000:])
+    assert page.dropped == taken.count(False)
+    ours.close()
+    theirs.close()
 
 
 def test_a_port_that_is_taken_is_said_in_one_line(page):

@@ -48,7 +48,7 @@ def server(tmp_path: Path) -> Iterator[Any]:
 def reading(robot: Robot, q: np.ndarray, force: np.ndarray, covariance: np.ndarray, **more: Any) -> Snapshot:
     whole = np.zeros((6, 6))
     whole[:3, :3] = covariance
-    values = {"stream": "arm", "t": 0.0, "contact": None, "counts": {}} | more
+    values = {"stream": "arm", "t": 0.0, "contacts": (), "counts": {}} | more
     return Snapshot(
         q=q,
         tau=np.zeros(robot.n_v),
@@ -188,8 +188,10 @@ def test_a_stream_that_has_ended_shows_no_force_also_when_it_is_chosen_again(ser
 
     robot = load_robot("two_link")
     page = LivePage(server, robot, clock=iter(np.arange(99.0)).__next__)
-    touch = Touch(1, "joint2", 0.0, 0.0, 9.0, open=True)
-    page.show(reading(robot, np.zeros(2), np.array([9.0, 0.0, 0.0]), np.eye(3), stream="first", contact=touch))
+    touch = Touch(2, "joint2", 0.0, 0.0, 9.0, open=True)
+    touches = touch._replace(number=1, open=False), touch
+    page.show(reading(robot, np.zeros(2), np.array([9.0, 0.0, 0.0]), np.eye(3), stream="first", contacts=touches))
+    assert page._streams["first"].contacts.contacts == touches[::-1]
     scene = page._scene
     assert scene._arrow.visible
     page.end("first")

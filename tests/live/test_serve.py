@@ -75,6 +75,7 @@ def test_samples_are_answered_until_sigterm_and_nothing_is_left_behind(folder: P
         ("clients", 2, "clients"),
         ("restarts", 1, "restart"),
         ("turned_away", 1, "turned away"),
+        ("unknown_datagrams", 1, "unknown datagram"),
     ],
 )
 def test_one_is_told_in_the_singular(name: str, count: int, words: str):
@@ -153,6 +154,7 @@ def test_what_cannot_be_served_is_an_error_in_a_line(folder: Path):
         (("--map", "map.toml"), "needs --robot or --free"),
         (("--alarms", "2"), "needs --free"),
         (("--constants", "10"), "needs --robot"),
+        (("--page", "0"), "no port of it"),
     ],
 )
 def test_options_that_nothing_would_heed_are_refused(folder: Path, words: tuple[str, ...], message: str):

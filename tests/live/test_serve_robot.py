@@ -45,6 +45,7 @@ class Page:
     url = "http://127.0.0.1:1"
     def send(self, snapshot):
         shown.append(tuple(snapshot))
+        return True
     def end(self, stream):
         pass
     def commands(self):

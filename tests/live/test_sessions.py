@@ -39,13 +39,16 @@ class Panel:
         self.url = "http://127.0.0.1:1"
         self.shown: list[Snapshot] = []
         self.ended: list[str] = []
-        self.closed = False
+        self.closed = self.is_busy = False
 
     def end(self, stream: str) -> None:
         self.ended.append(stream)
 
-    def send(self, snapshot: Snapshot) -> None:
+    def send(self, snapshot: Snapshot) -> bool:
+        if self.is_busy:
+            return False
         self.shown.append(snapshot)
+        return True
 
     def commands(self) -> list[str]:
         return ["zero"]
@@ -76,10 +79,12 @@ def test_contacts_of_a_stream_are_those_of_the_log():
     pushed = pushed_log()
     outbox, panel = Outbox(LOG.n_t), Panel()
     session = Session(Service(sensor=SENSOR, thresholds=THRESHOLDS, feed=Feed(panel)), name="one", outbox=outbox)
+    found = ContactDetector(thresholds=THRESHOLDS, step=1.0 / RATE).along(SENSOR.along(pushed))
+    unseen = next(event for event in found.events if event.start > 0.6)
     for t, q, tau in zip(pushed.t.tolist(), pushed.q.tolist(), pushed.tau.tolist(), strict=True):
+        panel.is_busy = unseen.start - 0.1 < t < unseen.end + 0.1  # it begins and ends while nothing is shown
         session.receive(json.dumps({"t": t, "q": q, "tau": tau}).encode(), t)
     answers = emptied(outbox)
-    found = ContactDetector(thresholds=THRESHOLDS, step=1.0 / RATE).along(SENSOR.along(pushed))
     assert [answer["contact"] for answer in answers] == found.touched.tolist()
     starts = [answer["t"] for answer in answers if answer.get("event") == "start"]
     assert starts == [event.start for event in found.events]
@@ -87,9 +92,12 @@ def test_contacts_of_a_stream_are_those_of_the_log():
     over = [event for event in found.events if not event.open]
     assert [answer["link"] for answer in answers if answer.get("event") == "end"] == [event.link for event in over]
     assert len({answer["link"] for answer in answers if answer["contact"]}) > len(over)  # links change meanwhile
-    shown = {touch.number: touch for touch in (snapshot.contact for snapshot in panel.shown) if touch is not None}
+    shown = {touch.number: touch for snapshot in panel.shown for touch in snapshot.contacts}
     told = {touch.number: found.events[touch.number - 1] for touch in shown.values() if not touch.open}
-    assert told
+    last = panel.shown[-1].t
+    assert set(told) == {k for k, event in enumerate(found.events, 1) if not event.open and event.end < last}
+    assert unseen in told.values()
+    assert len([touch for snapshot in panel.shown for touch in snapshot.contacts if not touch.open]) == len(told)
     for number, event in told.items():
         assert (shown[number].link, shown[number].start, shown[number].end) == (event.link, event.start, event.end)
 

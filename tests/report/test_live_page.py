@@ -91,7 +91,7 @@ def test_a_contact_is_one_row_whatever_its_link_and_ends_with_its_stream():
     first = Touch(1, "a", 0.1, 0.1, 2.0, open=True)
     over = first._replace(link="c", end=0.4, peak=5.0, open=False)
     second, third = Touch(2, "b", 0.5, 0.6, 3.0, open=True), Touch(4, "b", 0.8, 0.9, 3.0, open=True)
-    for newest in (None, first, first._replace(link="c", end=0.3, peak=5.0), over, over):
+    for newest in (first, first._replace(link="c", end=0.3, peak=5.0), over, over):
         log.see(newest)
     assert log.contacts == (over,)
     log.see(second)

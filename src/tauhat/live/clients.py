@@ -58,7 +58,7 @@ class Clients:
 
     def __init__(self, service: Service) -> None:
         self.service = service
-        self.totals: Counter[str] = Counter(clients=0, turned_away=0)
+        self.totals: Counter[str] = Counter(clients=0, turned_away=0, unknown_datagrams=0)
         self.waiting = WaitingRoom(service.limits.waiting)
         self.followers = Followers()
         self._clients: set[Client] = set()

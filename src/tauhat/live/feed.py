@@ -21,7 +21,7 @@ class Snapshot(NamedTuple):
     q, tau : (n_v,) position, and external torque less what was zeroed [rad or m, Nm or N]
     tau_std : (n_v,) its standard error
     wrench, covariance : (6,), (6, 6) at the sensor's frame [N, Nm]
-    contact : the latest, None before the first
+    contacts : those that have ended since the last snapshot, and last the one that goes on, if there is one
     counts : taken, late, not_finite, dropped, refused, restarts, frozen
     """
 
@@ -32,7 +32,7 @@ class Snapshot(NamedTuple):
     tau_std: FloatArray
     wrench: FloatArray
     covariance: FloatArray
-    contact: Touch | None
+    contacts: tuple[Touch, ...]
     counts: dict[str, int]
 
 
@@ -43,8 +43,8 @@ class Page(Protocol):
     def url(self) -> str:
         """Where it is seen."""
 
-    def send(self, snapshot: Snapshot, /) -> object:
-        """Show a snapshot, or leave it where that would have to wait."""
+    def send(self, snapshot: Snapshot, /) -> bool:
+        """Show a snapshot, or leave it where that would have to wait; return whether it is shown."""
 
     def end(self, stream: str, /) -> None:
         """Say that a stream that was shown has ended, without waiting."""
@@ -86,10 +86,9 @@ class Feed:
         self._due[stream] += len(self._due) / A_SECOND
         return True
 
-    def publish(self, snapshot: Snapshot) -> None:
-        """Show a snapshot."""
-        if self._page is not None:
-            self._page.send(snapshot)
+    def publish(self, snapshot: Snapshot) -> bool:
+        """Show a snapshot; return whether it is shown."""
+        return self._page is not None and self._page.send(snapshot)
 
     def commands(self) -> list[str]:
         """Return what was asked for on the page since the last call."""

@@ -2,13 +2,14 @@
 
 Towards the page go tuples of the server's own numbers, and the names of streams that have ended. Back come single
 words, which are compared and never unpacked: whatever a browser does to the page's process, nothing of it is run in the
-server.
+server, and sending never waits: what the system would not take at once is not sent.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import select
 import shutil
 import signal
 import tempfile
@@ -32,10 +33,10 @@ if TYPE_CHECKING:
     from tauhat.sensing.wrench import Axes
 
 _A_SECOND, _BURST = 30.0, 3.0  # snapshots on average, and at once
-_UNDERWAY = 2  # snapshots that the page has not taken yet: they fit the pipe, so that sending never waits
+_UNDERWAY = 2  # snapshots that the page has not taken yet
 _WORDS = frozenset({b"zero"})
 _ENDS = 64  # streams whose end the page was not told yet
-_TAKEN, _LONGEST = b"taken", 2048
+_TAKEN, _LONGEST, _HEARD = b"taken", 2048, 16  # words at one look
 _BEGIN = 60.0  # [s] for the process to begin
 _END = 5.0  # [s] for it to end
 _IDLE = 0.05  # [s] between looks at the page without a snapshot
@@ -57,6 +58,8 @@ class PageProcess:
 
     def __init__(self, process: Any, connection: Connection, url: str) -> None:
         self._process, self._connection = process, connection
+        self._room = select.poll()
+        self._room.register(connection, select.POLLOUT)  # a Unix socket has room as long as most of its buffer is free
         self.url = url
         self.dropped = 0
         self._underway = 0
@@ -119,22 +122,28 @@ class PageProcess:
         if self._allowance < 1.0:
             return False
         self._tell_ends()
-        return self._underway < _UNDERWAY
+        return self._has_room()
 
     def _tell_ends(self) -> None:
         """Take the words that have come, and tell of ends as far as the page takes more."""
         self._listen()
         try:
-            while self._ended and self._underway < _UNDERWAY:
+            while self._ended and self._has_room():
                 self._connection.send(self._ended.popleft())
                 self._underway += 1
         except (OSError, ValueError):
             self._ended.clear()  # the page is gone
 
+    def _has_room(self) -> bool:
+        """Return whether something may be sent: the page keeps up as it says, and sending would not wait either."""
+        return self._underway < _UNDERWAY and any(event == select.POLLOUT for _, event in self._room.poll(0))
+
     def _listen(self) -> None:
         """Take the words that have come."""
         try:
-            while self._connection.poll():
+            for _ in range(_HEARD):
+                if not self._connection.poll():
+                    return
                 self._hear(self._connection.recv_bytes(_LONGEST))
         except (OSError, EOFError):
             self._underway = _UNDERWAY  # the page is gone: nothing more is sent

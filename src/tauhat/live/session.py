@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,9 @@ from tauhat.sensing.contact import ContactSample
 from tauhat.sensing.sample_lines import Sample
 from tauhat.sensing.sensor import Sensed
 from tauhat.sensing.stream import JUDGED, SensorStream
-from tauhat.sensing.touch import TouchFollower
+from tauhat.sensing.touch import Touch, TouchFollower
+
+_UNSHOWN = 16  # contacts that have ended since the page was shown anything: of more, the newest
 
 
 class Session:
@@ -44,6 +47,7 @@ class Session:
         self._memory = self._stream.start()
         self._contact = None if service.detector is None else service.detector.start()
         self._touches = None if service.detector is None else TouchFollower(service.detector)
+        self._over: deque[Touch] = deque(maxlen=_UNSHOWN)
         self._form = AnswerForm(service.sensor.n_v)
         self._links = {link: json.dumps(link) for link in service.sensor.model.robot.joint_names}
         self._zero: FloatArray | None = None
@@ -145,8 +149,9 @@ class Session:
         tau, wrench = self._less(sensed, felt if standing is None else felt - standing)
         more = "" if found is None else self._said(sample.t, found, wrench)
         self._outbox.put(self._form.text(sample.t, (tau, sensed.variance, wrench, sensed.covariance), more))
-        if self._service.feed.is_due(self.name, now):
-            self._service.feed.publish(self._snapshot(sample.t, sensed, tau, wrench))
+        feed = self._service.feed
+        if feed.is_due(self.name, now) and feed.publish(self._snapshot(sample.t, sensed, tau, wrench)):
+            self._over.clear()
 
     def _less(self, sensed: Sensed, tau: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return external torque less what is taken off, and its wrench; error bars, which are the model's, stay."""
@@ -168,15 +173,17 @@ class Session:
             event = self._touches.see(t, self._contact, float(np.linalg.norm(wrench[:3])))
             if event == "end" and self._touches.newest is not None:
                 link = self._touches.newest.link
+                self._over.append(self._touches.newest)
         told = "null" if link is None else self._links[link]
         said = f', "contact": {"true" if found.contact else "false"}, "excess": {found.excess:.4g}, "link": {told}'
         return said if event is None else f'{said}, "event": "{event}"'
 
     def _snapshot(self, t: float, sensed: Sensed, tau: FloatArray, wrench: FloatArray) -> Snapshot:
-        counts = self._memory.counts
+        counts, newest = self._memory.counts, None if self._touches is None else self._touches.newest
+        goes_on = (newest,) if newest is not None and newest.open else ()
         return Snapshot(
             self.name, t, sensed.q, tau, np.sqrt(sensed.variance), wrench, sensed.covariance,
-            None if self._touches is None else self._touches.newest,
+            (*self._over, *goes_on),
             {
                 "taken": counts.taken, "late": counts.late + counts.repeated, "not_finite": counts.not_finite,
                 "dropped": self._outbox.dropped, "refused": self._malformed + self._limited,

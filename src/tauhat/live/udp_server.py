@@ -2,7 +2,8 @@
 
 Whoever sends datagrams can write any address on them. So an address that has not said the token gets no answer at all,
 and no small datagram makes the server send much to an address: only samples of a known client are answered, one for
-one. An address is a client from its first datagram on until it says that it ends, or has been silent for the idle time.
+one; datagrams that let nobody in are counted. An address is a client from its first datagram on until it says that it
+ends, or has been silent for the idle time.
 
 All clients share one socket. When more comes in than the server can answer, the system drops datagrams, whoever sent
 them: a stream that must lose nothing beside others belongs on another channel.
@@ -97,6 +98,7 @@ class UdpServer:
         now = self._loop.time()
         client = self._known.get(address) or self._newcomer(data, address, now)
         if client is None:
+            self._clients.totals["unknown_datagrams"] += 1
             return
         client.heard = now
         if client.throttle.wait(now) > 0.0:

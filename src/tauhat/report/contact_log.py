@@ -20,10 +20,8 @@ class ContactLog:
         """The newest first; older ones than the last fifty are forgotten."""
         return tuple(self._contacts)
 
-    def see(self, newest: Touch | None) -> None:
-        """Take note of the latest contact of a stream as it is now; None before the first."""
-        if newest is None:
-            return
+    def see(self, newest: Touch) -> None:
+        """Take note of a contact of a stream as it is now: the latest that was seen, or a later one."""
         if self._contacts and self._contacts[0].number == newest.number:
             self._contacts[0] = newest
             return

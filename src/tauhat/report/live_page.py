@@ -71,8 +71,8 @@ class Reading(Protocol):
         """Of the wrench, (6, 6)."""
 
     @property
-    def contact(self) -> Touch | None:
-        """The latest contact, None before the first."""
+    def contacts(self) -> tuple[Touch, ...]:
+        """Those that have ended since the last reading, and last the one that goes on, if there is one."""
 
     @property
     def counts(self) -> Mapping[str, int]:
@@ -98,7 +98,8 @@ class _Stream:
         self.newest = reading
         force, variances = np.asarray(reading.wrench)[:3], np.diagonal(reading.covariance)[:3]
         self.history.add(reading.t, force, np.sqrt(np.maximum(variances, 0.0)), reading.tau)
-        self.contacts.see(reading.contact)
+        for touch in reading.contacts:
+            self.contacts.see(touch)
 
     def end(self) -> None:
         self.has_ended = True
@@ -249,7 +250,8 @@ class LivePage:
     def _say_state(self, stream: _Stream, reading: Reading, now: float) -> None:
         silent = now - stream.alive_at
         self._scene.colour(stale=silent >= _SILENT)
-        error, touch = self._error(reading, stream.history), reading.contact
+        error = self._error(reading, stream.history)
+        touch = reading.contacts[-1] if reading.contacts else None
         if stream.has_ended:
             state, words = "ended", "the stream has ended"
         elif silent >= _SILENT:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tauhat.live.server import Channels
     from tauhat.live.universal_robots import UniversalRobot
 
-_WEBSOCKET = 8765
+_WEBSOCKET, _PAGE = 8765, 8080
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,8 +79,12 @@ class Options(SensingOptions):
     ] = None  # fmt: skip
     clients: Annotated[int, typer.Option("--clients", metavar="N", min=1, help="At a time, over all channels.")] = 8
     page: Annotated[
-        int, typer.Option("--page", metavar="PORT", min=0, max=65535, help="Of the page in the browser.")
-    ] = 8080
+        int | None,
+        typer.Option(
+            "--page", metavar="PORT", min=0, max=65535, show_default=False,
+            help=f"Of the page in the browser; {_PAGE} where not stated.",
+        ),
+    ] = None  # fmt: skip
     no_page: Annotated[bool, typer.Option("--no-page", help="Serve without a page.")] = False
     realtime: Annotated[
         bool, typer.Option("--realtime", help="Samples go before all ordinary programs; needs the right to (Linux).")
@@ -101,12 +105,16 @@ def run(options: Options) -> None:
     check_without_air(options.zero)
     if options.map_file is not None and options.robot is None and not options.free:
         raise typer.BadParameter("needs --robot or --free, whose columns it explains", param_hint="'--map'")
+    if options.no_page and options.page is not None:
+        raise typer.BadParameter("without a page there is no port of it", param_hint="'--page'")
     source = _source(options)
     channels = _channels(options, source)
     with working("preparing"):
         rate = _rate(options, source)
         known = prepared(options, sensor_of(options, rate))
-        page = None if options.no_page else _page(known, channels.access, options.page)
+        page = (
+            None if options.no_page else _page(known, channels.access, _PAGE if options.page is None else options.page)
+        )
     limits = Limits(clients=options.clients)
     service = Service(
         sensor=known.sensor, thresholds=known.thresholds, limits=limits, feed=Feed(page),
@@ -169,7 +177,7 @@ def _channels(options: Options, source: UniversalRobot | None) -> Channels:
 
 def _called(name: str, count: int) -> str:
     """Return what a count of the end is called: nouns in their number, the rest as they are."""
-    return name[:-1] if count == 1 and name in {"clients", "restarts"} else name.replace("_", " ")
+    return name[:-1] if count == 1 and name in {"clients", "restarts", "unknown_datagrams"} else name.replace("_", " ")
 
 
 def _page(known: Prepared, access: Access, port: int) -> Page:
