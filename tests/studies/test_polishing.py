@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -19,7 +19,13 @@ from tauhat.studies.polishing.arm import Arm, ArmSettings, Scene
 from tauhat.studies.polishing.calibration import STEADY, CalibrationSettings
 from tauhat.studies.polishing.findings import Findings, finished, spread
 from tauhat.studies.polishing.job import Job, JobLog
-from tauhat.studies.polishing.readers import LoadCellReading, ToolFriction, along_the_normal, of_three_forces
+from tauhat.studies.polishing.readers import (
+    ForceReader,
+    LoadCellReading,
+    ToolFriction,
+    along_the_normal,
+    of_three_forces,
+)
 from tauhat.studies.polishing.sensing_ways import LOAD_CELL, NO_WARMTH, reading_of
 from tauhat.studies.polishing.shift import ShiftSettings
 from tauhat.studies.polishing.trials import Outcome, judged
@@ -85,12 +91,55 @@ def test_on_a_load_cell_the_loop_holds_its_force_on_both_shapes(arm, models):
 def test_a_pass_in_air_is_taken_where_the_job_will_be(arm, models):
     scene = Scene(0, "flat", "cold")
     cell, job = arm.cell(scene, models.warm), arm.job(scene)
-    air = arm.air(scene, cell, job)
+    air, high = arm.air(scene, cell, job), SHORT.limits.height
     assert air.progress[-1] == pytest.approx(2 * 2 * SHORT.task.half, rel=0.01)
     assert (np.diff(air.progress) >= 0.0).all()
     place = np.array(postures_of(arm.described)[0].place)
-    tips = [forward_kinematics(arm.robot, q, frame=TIP).translation for q in air.recording.q[::50]]
-    assert min(float((tip - place)[2]) for tip in tips) > 0.5 * SHORT.limits.height
+    tips = np.array([forward_kinematics(arm.robot, q, frame=TIP).translation for q in air.recording.q])
+    above = tips[:, 2] - place[2]
+    assert above.min() > 0.5 * high
+    down = np.flatnonzero(air.down)
+    seconds = high / job.polisher.limits.approach_speed
+    assert down.size * job.polisher.period == pytest.approx(seconds, rel=0.05)
+    wanted = np.linspace(2.0 * high, high, down.size)
+    np.testing.assert_allclose(above[down], wanted, atol=1e-3)
+    assert (air.progress[: down[-1] + 1] == 0.0).all()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Misled(ForceReader):
+    """A reader whose drives have an offset that no model knows."""
+
+    inner: ForceReader
+    offset: np.ndarray
+
+    def start(self):
+        return self.inner.start()
+
+    def read(self, memory, sample, place):
+        return self.inner.read(memory, sample._replace(tau=sample.tau + self.offset), place)
+
+
+def test_what_the_same_job_shows_in_air_is_no_force_on_the_way_down_nor_in_the_passes(arm, models):
+    scene, offset = Scene(0, "flat", "cold"), np.array([0.0, 9.0, 6.0, 0.0, 0.0, 0.0])
+    cell, job = arm.cell(scene, models.warm), arm.job(scene)
+    air = arm.air(scene, cell, job)
+    seen = air._replace(recording=replace(air.recording, tau=air.recording.tau + offset))
+    felt = {}
+    for name in (NO_WARMTH, f"{NO_WARMTH}, pass in air"):
+        reader, source = reading_of(name, models.estimates, seen, cell)
+        asked = replace(job, polisher=replace(job.polisher, source=source))
+        running = start_cell(in_the_air(cell), job.beginning, rng=arm.rng_of_run(scene))
+        log = asked.done_in(running, Misled(inner=reader, offset=offset))
+        felt[name] = log.read[: int(1.5 / job.polisher.period)]
+        assert log.reason == "surface_misplaced"
+    without, zeroed = felt.values()
+    assert np.abs(without).mean() > 8.0
+    assert np.abs(zeroed).max() < job.polisher.contact.threshold
+    reader, source = reading_of(f"{NO_WARMTH}, pass in air", models.estimates, seen, cell)
+    asked = replace(job, polisher=replace(job.polisher, source=source))
+    running = start_cell(cell, job.beginning, rng=arm.rng_of_run(scene))
+    assert judged(_blank(), asked.done_in(running, Misled(inner=reader, offset=offset)), 30.0).rms < 0.2
 
 
 def test_hard_arms_have_changed_since_the_calibration_and_easy_ones_have_not(arm):

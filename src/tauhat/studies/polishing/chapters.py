@@ -62,7 +62,8 @@ def scene_chapter(found: Findings) -> Chapter:
         f"believe, friction by load, and since the calibration {100 * plant.wrong:g} % (one sigma) of "
         f"every link's weight and every drive's torque constant have changed. Warm arms are as warm as "
         f"the calibration leaves them; going on for long, it would take {100 * plant.lost[0]:g} to "
-        f"{100 * plant.lost[1]:g} % of their friction. A pass in air is made just before the job, as warm as it."
+        f"{100 * plant.lost[1]:g} % of their friction. A pass in air is the whole job {1e3 * arm.work.limits.height:g} "
+        "mm higher, way down and passes, made just before it and as warm."
     )
     loop = (
         "A force law of 1 Hz moves the tool along the normal. The error counts while the tool is fed under full force, "

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tauhat.arrays import FloatArray
 from tauhat.control.force.feed_profile import FeedProfile
@@ -17,14 +18,21 @@ from tauhat.simulation.contact.running_cell import CellSample, RunningCell
 from tauhat.studies.polishing.readers import ForceReader, Place
 
 _LONGEST = 120.0  # [s] of a job; one that lasts longer is given up
+_ARRIVED = 1e-9  # [m]
 _PEAK = 1.875  # largest over mean speed of a way with the least jerk
 
 
 class AirLog(NamedTuple):
-    """The log of the same motion in air, and the way of the tool since the passes began, (n,) [m]."""
+    """The log of a job in air.
+
+    recording : way in, way down, and passes
+    progress : (n,) way of the tool since the passes began [m]
+    down : (n,) whether it is on its way down
+    """
 
     recording: Recording
     progress: FloatArray
+    down: NDArray[np.bool_]
 
 
 class JobLog(NamedTuple):
@@ -73,7 +81,7 @@ class Job:
             when the arm goes unstable.
         """
         memory = reader.start()
-        for sample, _ in self._way(cell, self.way_in, passes=2):
+        for sample, _ in self._way(cell, self.way_in, passes=2, height=self.polisher.limits.height):
             memory, _ = reader.read(memory, sample, Place(0.0, 0.0))
         polisher, state, reading = self.polisher, self.polisher.start(), None
         rows: list[tuple[float, ...]] = []
@@ -85,25 +93,46 @@ class Job:
         return JobLog(t, s, depth, passing, true, read, std, state.phase, state.reason)
 
     def in_air(self, cell: RunningCell) -> AirLog:
-        """Return the log of the way in and of the passes above the surface."""
-        task = self.polisher.task
-        come = [(sample, 0.0) for sample, _ in self._way(cell, self.way_in, passes=2)]
-        passed = list(self._way(cell, task.feed, passes=task.passes))
-        samples = [sample for sample, _ in (*come, *passed)]
-        speeds = np.array([abs(ds) for _, ds in (*come, *passed)])
+        """Return the log of the job without contact: way in, way down and passes, as high above it as it begins."""
+        task, high = self.polisher.task, self.polisher.limits.height
+        come = list(self._moved(cell, (-task.half, -high), (-task.half, -2.0 * high)))
+        come += [sample for sample, _ in self._way(cell, self.way_in, passes=2, height=2.0 * high)]
+        down = list(self._down(cell))
+        stood = [cell.advance(*self.path.at(-task.half, 0.0, -high, 0.0)) for _ in range(self._periods(task.settle))]
+        passed = list(self._way(cell, task.feed, passes=task.passes, height=high))
+        samples = [*come, *down, *stood, *(sample for sample, _ in passed)]
         t, q, tau = (np.array([getattr(sample, name) for sample in samples]) for name in ("t", "q", "tau"))
         log = Recording(t=t, q=q, tau=tau, joint_names=self.path.robot.joint_names, name="in air")
-        return AirLog(log, np.cumsum(speeds) * self.polisher.period)
+        before, row = len(samples) - len(passed), np.arange(len(samples))
+        way = np.cumsum([abs(ds) for _, ds in passed]) * self.polisher.period
+        return AirLog(log, np.r_[np.zeros(before), way], (row >= len(come)) & (row < len(come) + len(down)))
 
     def come_back(self, cell: RunningCell, log: JobLog) -> None:
         """Move above the surface from where a job ended to where the next one begins, gently."""
-        task, s, depth = self.polisher.task, float(log.s[-1]), float(log.depth[-1])
-        way, rise = -task.half - s, -self.polisher.limits.height - depth
+        ended = float(log.s[-1]), float(log.depth[-1])
+        for _ in self._moved(cell, ended, (-self.polisher.task.half, -self.polisher.limits.height)):
+            pass
+
+    def _moved(self, cell: RunningCell, start: tuple[float, float], end: tuple[float, float]) -> Iterator[CellSample]:
+        """Move from a place along the path and a depth to others with the least jerk; yield the samples."""
+        (s, depth), way, rise = start, end[0] - start[0], end[1] - start[1]
         seconds = _PEAK * max(abs(way), abs(rise)) / self.way_in
-        for k in range(1, int(seconds / self.polisher.period) + 1):
+        for k in range(1, self._periods(seconds) + 1):
             x = k * self.polisher.period / seconds
             part, speed = x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * (x * (1.0 - x)) ** 2 / seconds
-            cell.advance(*self.path.at(s + part * way, speed * way, depth + part * rise, speed * rise))
+            yield cell.advance(*self.path.at(s + part * way, speed * way, depth + part * rise, speed * rise))
+
+    def _down(self, cell: RunningCell) -> Iterator[CellSample]:
+        """Come down from twice the height to it as a polisher does that feels nothing; yield the samples."""
+        limits, period, half = self.polisher.limits, self.polisher.period, self.polisher.task.half
+        above, speed = limits.height, 0.0
+        while above > _ARRIVED:
+            speed = min(limits.approach_speed, speed + limits.depth_acceleration * period, above / period)
+            above -= speed * period
+            yield cell.advance(*self.path.at(-half, 0.0, -limits.height - above, speed))
+
+    def _periods(self, seconds: float) -> int:
+        return int(seconds / self.polisher.period)
 
     def _step(self, cell: RunningCell, reader: ForceReader, now: tuple[Any, Any, Any, float]) -> tuple[Any, ...]:
         """Return what is remembered one period later, and a row of the log."""
@@ -111,18 +140,21 @@ class Job:
         state, command = self.polisher.step(state, reading)
         sample = cell.advance(*self.path.follow(command))
         progress += abs(command.ds) * self.polisher.period
-        memory, reading = reader.read(memory, sample, Place(float(np.sign(command.ds)), progress))
+        place = Place(float(np.sign(command.ds)), progress, state.phase == "approach")
+        memory, reading = reader.read(memory, sample, place)
         force, std = (np.nan, np.nan) if reading is None else reading
         passing = float(state.phase == "pass")
         row = (sample.t, command.s, command.depth, passing, sample.normal_force, force, std)
         return memory, reading, state, progress, row
 
-    def _way(self, cell: RunningCell, speed: float, *, passes: int) -> Iterator[tuple[CellSample, float]]:
+    def _way(
+        self, cell: RunningCell, speed: float, *, passes: int, height: float
+    ) -> Iterator[tuple[CellSample, float]]:
         """Move there and back above the surface; yield the samples, with the speed along the path."""
-        task, height = self.polisher.task, -self.polisher.limits.height
+        task = self.polisher.task
         profile = FeedProfile(half=task.half, speed=speed, acceleration=task.acceleration)
         for number in range(passes):
             way = -1.0 if number % 2 else 1.0
-            for k in range(1, int(profile.duration / self.polisher.period) + 1):
+            for k in range(1, self._periods(profile.duration) + 1):
                 s, ds = profile.at(k * self.polisher.period)
-                yield cell.advance(*self.path.at(way * s, way * ds, height, 0.0)), way * ds
+                yield cell.advance(*self.path.at(way * s, way * ds, -height, 0.0)), way * ds

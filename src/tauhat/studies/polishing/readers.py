@@ -21,10 +21,12 @@ class Place(NamedTuple):
 
     along : direction of the feed along the tool's x: 1, -1, or 0 while it stands
     progress : way of the tool since the passes began, there and back [m]
+    down : whether it is on its way down, in the air as far as anyone knows
     """
 
     along: float
     progress: float
+    down: bool = False
 
 
 class ForceReader(ABC):
@@ -69,6 +71,21 @@ class NoReading(ForceReader):
         return memory, None
 
 
+class AirZero(NamedTuple):
+    """The external torque that a job in air shows.
+
+    down : (n_v,) its mean while the tool comes down; what swings about it never swings alike twice [Nm or N]
+    passes : by the way of the tool since they began
+    """
+
+    down: FloatArray
+    passes: AirPass
+
+    def at(self, place: Place) -> FloatArray:
+        """Return the torque to take off, (n_v,); between the way down and the passes that of their beginning."""
+        return self.down if place.down else self.passes.torque_at(np.array([place.progress]))[0]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SensedReading(ForceReader):
     """The virtual sensor: external torque of the joints, solved for the force along the tool's axis.
@@ -79,12 +96,12 @@ class SensedReading(ForceReader):
     sensor : of the external torque
     solvers : of the force while the tool stands, moves along its x, and against it
     normal : (6,) unit wrench whose part in the solved one is the normal force
-    zero : torque that the same way shows in air; None: nothing is taken off
+    zero : what the same job shows in air; None: nothing is taken off
     """
 
     sensor: ForceSensor
     solvers: tuple[WrenchSolver, WrenchSolver, WrenchSolver]
-    zero: AirPass | None = None
+    zero: AirZero | None = None
     normal: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, -1.0, 0.0, 0.0, 0.0]))
 
     def start(self) -> FloatArray:
@@ -100,7 +117,7 @@ class SensedReading(ForceReader):
         """Return the force along the tool's axis, with its error, that makes this external torque."""
         tau = sensed.tau
         if self.zero is not None:
-            tau = tau - self.zero.torque_at(np.array([place.progress]))[0]
+            tau = tau - self.zero.at(place)
         solver = self.solvers[round(place.along)]
         found = solver.along(sensed.q[None], tau[None], sensed.variance[None], own=np.square(sensed.lag)[None])
         force = float(self.normal @ found.wrench[0])

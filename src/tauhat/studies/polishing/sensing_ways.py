@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import numpy as np
+
 from tauhat.control.force.force_source import BelievedForce, ForceSource, MeasuredForce
 from tauhat.estimation.estimate import Estimate
 from tauhat.sensing.observers import observer_named
@@ -17,6 +19,7 @@ from tauhat.simulation.contact.tool import TIP
 from tauhat.studies.polishing.calibration import STEADY, TEXTBOOK, THERMAL
 from tauhat.studies.polishing.job import AirLog
 from tauhat.studies.polishing.readers import (
+    AirZero,
     ForceReader,
     LoadCellReading,
     NoReading,
@@ -97,10 +100,11 @@ def reading_of(
     return {**WAYS, **OTHERS}[name].reader(estimates, air, cell.sample_rate), MeasuredForce()
 
 
-def _zero(sensor: ForceSensor, air: AirLog) -> AirPass:
-    """Return the torque that the passes in air show, by the way of the tool."""
+def _zero(sensor: ForceSensor, air: AirLog) -> AirZero:
+    """Return the torque that a job in air shows: on the way down on average, in the passes by the way of the tool."""
     sensed = sensor.along(air.recording)
-    progress = air.progress[sensed.rows]
-    on_pass = sensed.settled & (progress > 0.0)
-    on_pass[1:] &= progress[1:] > progress[:-1]
-    return AirPass(progress=progress[on_pass], torque=sensed.tau[on_pass], wrench=sensed.wrench[on_pass])
+    progress, down = air.progress[sensed.rows], np.flatnonzero(sensed.settled & air.down[sensed.rows])
+    fed = sensed.settled & (progress > 0.0)
+    fed[1:] &= progress[1:] > progress[:-1]
+    passes = AirPass(progress=progress[fed], torque=sensed.tau[fed], wrench=sensed.wrench[fed])
+    return AirZero(sensed.tau[down[down.size // 2 :]].mean(axis=0), passes)

@@ -88,8 +88,8 @@ class WorkSettings:
         return replace(believed, place=lifted, rotation=believed.rotation @ about_x @ about_y)
 
     def joints(self, robot: Robot, posture: Posture, believed: Surface, mount: ToolMount) -> PathJoints:
-        """Return the joints along the believed surface, over all depths that the polisher may ask for."""
-        depths = (-self.limits.height, self.limits.deepest)
+        """Return the joints along the believed surface, over all depths of a job, and of the same in air above it."""
+        depths = (-2.0 * self.limits.height, self.limits.deepest)
         return path_joints(robot, believed, tool=mount, seed=np.array(posture.seed), depths=depths)
 
 
