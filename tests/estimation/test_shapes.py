@@ -11,7 +11,7 @@ from rough_arms import SETTINGS, rough_truth, slow_and_fast
 from tauhat.dynamics import base_parameters, torque_model
 from tauhat.dynamics.terms import Coulomb, Dahl, PolynomialFriction, ShapedTerm, Stribeck
 from tauhat.estimation import identify
-from tauhat.estimation.evidence import collect_all
+from tauhat.estimation.evidence import collect_all, gathering
 from tauhat.estimation.least_squares import WeightedLeastSquares
 from tauhat.estimation.shapes import chosen_form
 from tauhat.estimation.solution import joint_residuals
@@ -52,7 +52,7 @@ def test_without_noise_a_shape_on_the_grid_is_found_exactly() -> None:
     forms = [Stribeck(speeds=(speed, 3 * speed)) for speed in (0.02, 0.05, 0.1)]
     truth = rough_truth(forms[1], keys="inertia,viscous,coulomb", **DRY, Fs=1.0)
     base = base_parameters(truth.model)
-    chosen = chosen_form(truth.model, base, forms, [slow_and_fast(truth, seed=3)], SETTINGS)
+    chosen = chosen_form(truth.model, base, forms, gathering([slow_and_fast(truth, seed=3)], SETTINGS))
     assert chosen.shape == pytest.approx((0.05, 0.15))
 
 
@@ -60,7 +60,7 @@ def test_joints_may_take_different_forms_of_the_grid() -> None:
     truth = rough_truth(Dahl(scales=(1.0, 3.0)), keys="inertia,viscous", Fv=0.6, Fd=1.0, Fe=1.0)
     base = base_parameters(truth.model)
     forms = [Dahl(scales=(scale, scale)) for scale in (0.3, 1.0, 3.0)]
-    chosen = chosen_form(truth.model, base, forms, [slow_and_fast(truth, seed=4)], SETTINGS)
+    chosen = chosen_form(truth.model, base, forms, gathering([slow_and_fast(truth, seed=4)], SETTINGS))
     assert chosen.shape == pytest.approx((1.0, 3.0))
 
 
@@ -76,7 +76,7 @@ def test_a_closer_look_never_leaves_more_residual_than_the_grid() -> None:
         return float(np.log(residuals).mean())
 
     forms = [Stribeck(speeds=(speed, speed)) for speed in (0.02, 0.08, 0.3)]
-    best = chosen_form(truth.model, base, forms, [recording], SETTINGS)
+    best = chosen_form(truth.model, base, forms, gathering([recording], SETTINGS))
     assert isinstance(best, Stribeck)
     assert level(best) < min(level(form) for form in forms) + 1e-3
 

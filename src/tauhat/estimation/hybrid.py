@@ -16,7 +16,6 @@ Source: Han, Wu, Liu, Xiong, "An iterative approach for accurate dynamic model i
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -27,7 +26,7 @@ from tauhat.dynamics.base import BaseParameters, base_parameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.terms import Shaped
 from tauhat.errors import ModelError
-from tauhat.estimation.evidence import Evidence, collect_all
+from tauhat.estimation.evidence import Evidence, Gather, collect_all
 from tauhat.estimation.losses import Cauchy, Loss
 from tauhat.estimation.problem import Problem
 from tauhat.estimation.repeated_rows import repeated_rows
@@ -68,16 +67,16 @@ class HybridLeastSquares(ReweightedLeastSquares):
     def _reshaped(self, problem: Problem) -> TorqueModel:
         """Return the model with every chosen shape looked at again on the rows as the fit weighs them."""
         model, shaped = problem.model, [term for term in problem.model.terms if isinstance(term, Shaped)]
-        gather = self._gathering(problem) if any(term.shape for term in shaped) else None
+        shaped = [term for term in shaped if term.shape]
+        if not shaped:
+            return model
+        gather = self._gathering(problem)
         for term in shaped:
-            if not term.shape:
-                continue
             forms = [term.with_shape([factor * value for value in term.shape]) for factor in WIDER]
-            best = chosen_form(model, problem.base, forms, problem.recordings, problem.processing, gather=gather)
-            model = model.with_term(best)
+            model = model.with_term(chosen_form(model, problem.base, forms, gather))
         return model
 
-    def _gathering(self, problem: Problem) -> Callable[[TorqueModel, BaseParameters], Evidence]:
+    def _gathering(self, problem: Problem) -> Gather:
         """Return what collects the evidence of any model on the same rows, weighted by the fit of this one.
 
         One weight a row and joint is kept: other models' rows are at the same times.
@@ -95,9 +94,9 @@ class HybridLeastSquares(ReweightedLeastSquares):
             first = int(np.searchsorted(times[index], piece.t[0]))
             return weights[index][:, first : first + piece.t.size]
 
-        def gather(model: TorqueModel, base: BaseParameters) -> Evidence:
+        def gather(model: TorqueModel, base: BaseParameters, most_blocks: int) -> Evidence:
             other = repeated_rows(replace(problem, model=model, base=base, kept=()))
-            return other.weighted(weight_of, most_blocks=1)
+            return other.weighted(weight_of, most_blocks=most_blocks)
 
         return gather
 

@@ -42,12 +42,22 @@ class Rows(NamedTuple):
 
 
 def filtered_rows(
-    model: TorqueModel, layout: Layout, recording: Recording, processing: Processing, *, chunk: int = CHUNK
+    model: TorqueModel,
+    layout: Layout,
+    recording: Recording,
+    processing: Processing,
+    *,
+    chunk: int = CHUNK,
+    motion: Iterable[Stretch] | None = None,
 ) -> Iterator[Rows]:
     """Yield the rows of a recording; the same whatever the chunk.
 
     Standstill at both ends is left out, and where the log begins or ends in motion the time that the filters take to
     forget how they were continued there, `1 / cutoff`.
+
+    Parameters
+    ----------
+    motion : `stretches` of the recording through this processing, where they are at hand
 
     Raises
     ------
@@ -57,8 +67,8 @@ def filtered_rows(
     check_joints(model, recording)
     clock = uniform_clock(recording, processing.delay)
     begin, end = _trusted_window(recording, processing)
-    motion = stretches(recording, processing, chunk=chunk)
-    for rows in rows_of_stretches(model, layout, motion, processing, step=clock.step):
+    processed = stretches(recording, processing, chunk=chunk) if motion is None else motion
+    for rows in rows_of_stretches(model, layout, processed, processing, step=clock.step):
         kept = (rows.t >= begin) & (rows.t <= end)
         if kept.any():
             yield Rows(rows.t[kept], rows.columns[:, kept], rows.tau[:, kept], rows.dq[:, kept])

@@ -11,9 +11,8 @@ separate", 1973.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -21,14 +20,11 @@ from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.terms import Bank, Shaped
-from tauhat.estimation.evidence import Evidence, collect_all
+from tauhat.estimation.evidence import Evidence, Gather
 from tauhat.estimation.solution import joint_residuals, joint_torques, weighted_rows
-from tauhat.recordings.processing import Processing
-from tauhat.recordings.recording import Recording
 
 FINER = (0.6, 0.8, 1.0, 1.25, 1.6)  # of the best shape on the grid: the second look
 LEAST_GAIN = 0.002  # of the residual of all joints, for one joint to take another form than most
-Gather: TypeAlias = Callable[[TorqueModel, BaseParameters], Evidence]
 _SWEEPS = 2
 _RIDGE = 1e-7  # on columns of unit norm: a form that the motion never shows must not spoil the factor
 
@@ -37,24 +33,20 @@ def chosen_form(
     model: TorqueModel,
     base: BaseParameters,
     forms: Sequence[Shaped],
-    recordings: Sequence[Recording],
-    processing: Processing,
-    *,
-    gather: Gather | None = None,
+    gather: Gather,
 ) -> Shaped:
     """Return the mixture of `forms` of one of the model's terms that leaves the least residual.
 
     Parameters
     ----------
     base : of the model with the term in any of its forms
-    gather : makes the evidence; of all rows alike by default
+    gather : makes the evidence
 
     The shape is then looked at more closely around the best of the forms.
     """
-    take = gather or (lambda wide, kept: collect_all(wide, kept, recordings, processing, most_blocks=1))
-    best = _mixture(model, base, forms, take)
+    best = _mixture(model, base, forms, gather)
     closer = [best.with_shape([factor * value for value in best.shape]) for factor in FINER]
-    return _mixture(model, base, closer, take)
+    return _mixture(model, base, closer, gather)
 
 
 def _mixture(model: TorqueModel, base: BaseParameters, forms: Sequence[Shaped], gather: Gather) -> Shaped:
@@ -109,7 +101,7 @@ def _choice(model: TorqueModel, base: BaseParameters, forms: Sequence[Shaped], g
     unshaped = start + np.flatnonzero(shaping < 0)
     shaped = start + np.flatnonzero(np.tile(shaping, len(forms)) >= 0)
     kept = np.sort(np.concatenate([moved, unshaped, shaped]))
-    evidence = gather(banked, _kept_set(banked, kept))
+    evidence = gather(banked, _kept_set(banked, kept), 1)
     owned = {
         int(value): tuple(
             np.searchsorted(kept, start + form * size + np.flatnonzero(shaping == value)) for form in range(len(forms))

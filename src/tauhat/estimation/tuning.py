@@ -18,10 +18,11 @@ from tauhat.dynamics.model import TorqueModel
 from tauhat.dynamics.terms import Facts, Shaped
 from tauhat.errors import TauhatWarning
 from tauhat.estimation.delay import position_delay
-from tauhat.estimation.evidence import collect_all
+from tauhat.estimation.evidence import Gather, gathering
 from tauhat.estimation.iterating import first_loaded
 from tauhat.estimation.least_squares import WeightedLeastSquares
 from tauhat.estimation.problem import Problem
+from tauhat.estimation.remembered_rows import RememberedRows
 from tauhat.estimation.shape_uncertainty import nearer_shapes
 from tauhat.estimation.shapes import chosen_form
 from tauhat.estimation.solution import joint_residuals
@@ -64,7 +65,7 @@ def tuned(
 def tuned_through(model: TorqueModel, sample: Sequence[Recording], processing: Processing) -> TorqueModel:
     """Return the model with its shapes chosen on a sample of the recordings, through filters that are settled."""
     model = first_loaded(_informed(model, sample), sample, processing, WeightedLeastSquares())
-    return _shaped(model, base_parameters(model), sample, processing)
+    return _shaped(model, base_parameters(model), sample, RememberedRows(sample, processing))
 
 
 def tuned_from(model: TorqueModel, sample: Sequence[Recording], settings: Processing) -> tuple[TorqueModel, Processing]:
@@ -81,7 +82,8 @@ def tuned_from(model: TorqueModel, sample: Sequence[Recording], settings: Proces
     """
     model = first_loaded(_informed(model, sample), sample, settings, WeightedLeastSquares())
     base = base_parameters(model)
-    shaped = _shaped(model, base, sample, settings)
+    rows = RememberedRows(sample, settings)
+    shaped = _shaped(model, base, sample, rows)
     delay = position_delay(shaped, base, sample, settings)
     if delay.certain:
         settings = replace(settings, delay=delay.seconds)
@@ -91,14 +93,14 @@ def tuned_from(model: TorqueModel, sample: Sequence[Recording], settings: Proces
             stacklevel=4,
         )
     settings = _best_processing(shaped, base, sample, settings)
-    return _shaped(model, base, sample, settings), settings
+    if settings == rows.processing:
+        return shaped, settings
+    return _shaped(model, base, sample, RememberedRows(sample, settings)), settings
 
 
-def residual_level(
-    model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], processing: Processing
-) -> float:
+def _residual_level(model: TorqueModel, base: BaseParameters, gather: Gather) -> float:
     """Return the mean logarithm of the joints' residuals after a weighted fit: what candidates are judged by."""
-    evidence = collect_all(model, base, recordings, processing, most_blocks=1)
+    evidence = gather(model, base, 1)
     residuals = joint_residuals(evidence, WeightedLeastSquares(passes=1).solve(evidence).values)
     return float(np.mean(np.log(np.maximum(residuals, np.finfo(float).tiny))))
 
@@ -145,7 +147,7 @@ def _facts(recordings: Sequence[Recording]) -> Facts:
 
 
 def _shaped(
-    model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], processing: Processing
+    model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], rows: RememberedRows
 ) -> TorqueModel:
     """Return the model with every open shape chosen; terms are visited in turn until none of them changes."""
     facts = _facts(recordings)
@@ -154,28 +156,22 @@ def _shaped(
     for _ in range(_SWEEPS if len(choices) > 1 else 1):
         before = model.terms
         for forms in choices:
-            model = model.with_term(chosen_form(model, base, forms, recordings, processing))
+            model = model.with_term(chosen_form(model, base, forms, rows.gather))
         if model.terms == before:
             break
-    return _refined(model, base, {forms[0].key for forms in choices}, recordings, processing)
+    return _refined(model, base, {forms[0].key for forms in choices}, rows)
 
 
-def _refined(
-    model: TorqueModel,
-    base: BaseParameters,
-    keys: Collection[str],
-    recordings: Sequence[Recording],
-    processing: Processing,
-) -> TorqueModel:
+def _refined(model: TorqueModel, base: BaseParameters, keys: Collection[str], rows: RememberedRows) -> TorqueModel:
     """Return the model with the shapes of the terms `keys` taken off the grid, as long as that lowers the residual."""
-    level = residual_level(model, base, recordings, processing) if keys else 0.0
+    level = _residual_level(model, base, rows.gather) if keys else 0.0
     for _ in range(_STEPS if keys else 0):
-        evidence = collect_all(model, base, recordings, processing, most_blocks=1)
+        evidence = rows.gather(model, base, 1)
         problem = Problem(
-            model=model, base=base, recordings=tuple(recordings), processing=processing, evidence=evidence
+            model=model, base=base, recordings=(), processing=rows.processing, evidence=evidence, gather=rows.gather
         )
         moved = nearer_shapes(problem, WeightedLeastSquares().fit(evidence), keys)
-        nearer = residual_level(moved, base, recordings, processing)
+        nearer = _residual_level(moved, base, rows.gather)
         if not nearer < level:
             break
         model, level = moved, nearer
@@ -191,9 +187,9 @@ def _best_processing(
     if all(recording.dq is not None for recording in recordings):
         candidates += [replace(default, velocity="velocity", motion_cutoff=narrow)]
         candidates += [replace(default, velocity="velocity")]
-    best, level = default, residual_level(model, base, recordings, default)
+    best, level = default, _residual_level(model, base, gathering(recordings, default))
     for candidate in candidates:
-        other = residual_level(model, base, recordings, candidate)
+        other = _residual_level(model, base, gathering(recordings, candidate))
         if other < level - _LEAST_GAIN:
             best, level = candidate, other
     return best

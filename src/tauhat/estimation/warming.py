@@ -68,7 +68,7 @@ def warmed(
     term, is_open = _heated_by_rest(model, term, take, estimator), not term.times
     model = model.with_term(term)
     if is_open:
-        model = _timed(model, term, recordings, processing, take)
+        model = _timed(model, term, take)
     passed = [_own(model)]
     for _ in range(_MOST_PASSES):
         model = model.with_term(_heated_back(model, passed[-1], take, estimator))
@@ -166,16 +166,11 @@ def _split_friction(model: TorqueModel, base: BaseParameters, values: FloatArray
     return np.column_stack([np.where(dry + viscous > 0.0, dry, 1.0), viscous])  # without friction motion itself warms
 
 
-def _timed(
-    model: TorqueModel, term: Thermal, recordings: Sequence[Recording], processing: Processing, gather: Gather
-) -> TorqueModel:
+def _timed(model: TorqueModel, term: Thermal, gather: Gather) -> TorqueModel:
     """Return the model with the time constants of the grid that leave the least residual."""
     forms = term.forms(model.robot.n_v)
     base = base_parameters(model.with_term(forms[0]))
-    chosen = chosen_form(
-        model, base, forms, recordings, processing, gather=lambda wide, kept: gather(wide, kept, 1)
-    )  # fmt: skip
-    return model.with_term(chosen)
+    return model.with_term(chosen_form(model, base, forms, gather))
 
 
 def _nearer(model: TorqueModel, processing: Processing, gather: Gather) -> TorqueModel:
