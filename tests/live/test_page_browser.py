@@ -133,9 +133,10 @@ def test_a_client_that_leaves_ends_its_stream_and_its_contact(page, tab):
     touch = Touch(2, "link5", 320.0, 320.0, 9.0, open=True)
     shown(page, tab, "document.body.innerText.includes('goes on')", snapshot(320.0, force=9.0, contacts=(touch,)))
     page.end("nobody")
-    page.end("arm")
+    page.end("arm", (touch._replace(peak=77.7), touch._replace(number=3, link="link3")))
     assert "the stream has ended" in tab.until("document.querySelector('[data-state=ended]')?.innerText")
     tab.until("!document.body.innerText.includes('goes on')")
+    tab.until("document.body.innerText.includes('77.7') && document.body.innerText.includes('link3')")
     shown(page, tab, "document.querySelector('[data-state=live]') !== null", snapshot(1.0, force=1.0, stream="again"))
 
 

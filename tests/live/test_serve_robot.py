@@ -46,7 +46,7 @@ class Page:
     def send(self, snapshot):
         shown.append(tuple(snapshot))
         return True
-    def end(self, stream):
+    def end(self, stream, contacts):
         pass
     def commands(self):
         return []

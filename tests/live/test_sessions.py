@@ -28,6 +28,7 @@ from tauhat.report.live_panel import counts_html
 from tauhat.robots.kinematics import pinocchio_model
 from tauhat.sensing import ContactDetector, WrenchSolver, zeroed
 from tauhat.sensing.judged_log import judged_log
+from tauhat.sensing.touch import Touch
 
 PUSHED = slice(700, 1100)
 
@@ -39,10 +40,12 @@ class Panel:
         self.url = "http://127.0.0.1:1"
         self.shown: list[Snapshot] = []
         self.ended: list[str] = []
+        self.last: tuple[Touch, ...] = ()
         self.closed = self.is_busy = False
 
-    def end(self, stream: str) -> None:
+    def end(self, stream: str, contacts: tuple[Touch, ...]) -> None:
         self.ended.append(stream)
+        self.last = contacts
 
     def send(self, snapshot: Snapshot) -> bool:
         if self.is_busy:
@@ -78,7 +81,8 @@ def pushed_log() -> Recording:
 def test_contacts_of_a_stream_are_those_of_the_log():
     pushed = pushed_log()
     outbox, panel = Outbox(LOG.n_t), Panel()
-    session = Session(Service(sensor=SENSOR, thresholds=THRESHOLDS, feed=Feed(panel)), name="one", outbox=outbox)
+    service = Service(sensor=SENSOR, thresholds=THRESHOLDS, feed=Feed(panel))
+    session = Session(service, name="one", outbox=outbox)
     found = ContactDetector(thresholds=THRESHOLDS, step=1.0 / RATE).along(SENSOR.along(pushed))
     unseen = next(event for event in found.events if event.start > 0.6)
     for t, q, tau in zip(pushed.t.tolist(), pushed.q.tolist(), pushed.tau.tolist(), strict=True):
@@ -98,6 +102,13 @@ def test_contacts_of_a_stream_are_those_of_the_log():
     assert set(told) == {k for k, event in enumerate(found.events, 1) if not event.open and event.end < last}
     assert unseen in told.values()
     assert len([touch for snapshot in panel.shown for touch in snapshot.contacts if not touch.open]) == len(told)
+    panel.is_busy = True
+    for row in range(PUSHED.start, PUSHED.stop + 400):  # once more, unseen to its end
+        t = float(pushed.t[-1]) + (row - PUSHED.start + 1) / RATE
+        session.receive(json.dumps({"t": t, "q": pushed.q[row].tolist(), "tau": pushed.tau[row].tolist()}).encode(), t)
+    service.feed.forget("one", session.unshown)
+    assert panel.last
+    assert min(touch.number for touch in panel.last) > max(shown)
     for number, event in told.items():
         assert (shown[number].link, shown[number].start, shown[number].end) == (event.link, event.start, event.end)
 

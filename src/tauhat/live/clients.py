@@ -51,7 +51,8 @@ class Clients:
 
     Attributes
     ----------
-    totals : clients so far, connections that were turned away, and the counts of the clients that have left
+    totals : clients so far, connections that were turned away, datagrams of addresses that were not let in, and the
+        counts of the clients that have left
     waiting : connections that are no clients yet
     followers : those that are sent what is said of the robot that the server reads
     """
@@ -111,7 +112,7 @@ class Clients:
         if client in self._clients:
             self._clients.remove(client)
             self.totals.update(client.session.counts)
-        self.service.feed.forget(client.session.name)
+        self.service.feed.forget(client.session.name, client.session.unshown)
 
     async def obey(self) -> None:
         """Do for all streams, until cancelled, what is asked for on the page."""

@@ -21,7 +21,8 @@ class Snapshot(NamedTuple):
     q, tau : (n_v,) position, and external torque less what was zeroed [rad or m, Nm or N]
     tau_std : (n_v,) its standard error
     wrench, covariance : (6,), (6, 6) at the sensor's frame [N, Nm]
-    contacts : those that have ended since the last snapshot, and last the one that goes on, if there is one
+    contacts : those that have ended since the last snapshot that was shown, the newest sixteen, and last the one that
+        goes on, if there is one
     counts : taken, late, not_finite, dropped, refused, restarts, frozen
     """
 
@@ -46,8 +47,8 @@ class Page(Protocol):
     def send(self, snapshot: Snapshot, /) -> bool:
         """Show a snapshot, or leave it where that would have to wait; return whether it is shown."""
 
-    def end(self, stream: str, /) -> None:
-        """Say that a stream that was shown has ended, without waiting."""
+    def end(self, stream: str, contacts: tuple[Touch, ...], /) -> None:
+        """Say that a stream that was shown has ended, and with which contacts since, without waiting."""
 
     def commands(self) -> list[str]:
         """Return what was asked for since the last call, at once."""
@@ -94,10 +95,15 @@ class Feed:
         """Return what was asked for on the page since the last call."""
         return [] if self._page is None else self._page.commands()
 
-    def forget(self, stream: str) -> None:
-        """Leave the turns to other streams: this one has ended, and where it was shown that is said."""
+    def forget(self, stream: str, contacts: tuple[Touch, ...] = ()) -> None:
+        """Leave the turns to other streams: this one has ended, and where it was shown that is said.
+
+        Parameters
+        ----------
+        contacts : that were not shown yet
+        """
         if self._due.pop(stream, None) is not None and self._page is not None:
-            self._page.end(stream)
+            self._page.end(stream, contacts)
 
     def close(self) -> None:
         """End the page."""

@@ -1,8 +1,8 @@
 """The page in a process of its own, so that drawing takes no time from sensing.
 
-Towards the page go tuples of the server's own numbers, and the names of streams that have ended. Back come single
-words, which are compared and never unpacked: whatever a browser does to the page's process, nothing of it is run in the
-server, and sending never waits: what the system would not take at once is not sent.
+Towards the page go tuples of the server's own numbers, and of streams that have ended their names and last contacts.
+Back come single words, which are compared and never unpacked: whatever a browser does to the page's process, nothing of
+it is run in the server, and sending never waits: what the system would not take at once is not sent.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from tauhat.live.gate import Gate
 if TYPE_CHECKING:
     from tauhat.report.live_page import LivePage
     from tauhat.robots.robot import Robot
+    from tauhat.sensing.touch import Touch
     from tauhat.sensing.wrench import Axes
 
 _A_SECOND, _BURST = 30.0, 3.0  # snapshots on average, and at once
@@ -66,7 +67,7 @@ class PageProcess:
         self._allowance, self._counted_at = _BURST, time.monotonic()
         self._looked_at = 0.0
         self._asked: list[str] = []
-        self._ended: deque[str] = deque(maxlen=_ENDS)
+        self._ended: deque[tuple[str, tuple[Touch, ...]]] = deque(maxlen=_ENDS)
         self._lock = threading.Lock()
 
     @property
@@ -91,10 +92,15 @@ class PageProcess:
         self.dropped += 1
         return False
 
-    def end(self, stream: str) -> None:
-        """Tell the page, behind what it was shown of a stream, that it has ended: now or when it takes more."""
+    def end(self, stream: str, contacts: tuple[Touch, ...] = ()) -> None:
+        """Tell the page, behind what it was shown of a stream, that it has ended: now or when it takes more.
+
+        Parameters
+        ----------
+        contacts : of the stream since its last snapshot
+        """
         with self._lock:
-            self._ended.append(stream)
+            self._ended.append((stream, contacts))
             self._tell_ends()
 
     def commands(self) -> list[str]:
@@ -250,10 +256,10 @@ def _follow(connection: Connection, page: LivePage) -> None:
         ready = wait(ends, timeout=_IDLE)
         if connection in ready:
             told = connection.recv()
-            if isinstance(told, str):
-                page.end(told)
-            else:
+            if len(told) == len(Snapshot._fields):
                 page.show(Snapshot(*told))
+            else:
+                page.end(*told)
             connection.send_bytes(_TAKEN)
         elif ready:
             return

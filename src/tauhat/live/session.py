@@ -61,6 +61,12 @@ class Session:
         counts = self._memory.counts._replace(malformed=self._malformed)
         return counts._asdict() | {"limited": self._limited, "dropped": self._outbox.dropped}
 
+    @property
+    def unshown(self) -> tuple[Touch, ...]:
+        """Contacts that have ended since the page was shown anything, and the one that goes on, if there is one."""
+        newest = None if self._touches is None else self._touches.newest
+        return (*self._over, newest) if newest is not None and newest.open else tuple(self._over)
+
     def receive(self, data: bytes, now: float) -> None:
         """Answer a message.
 
@@ -179,11 +185,10 @@ class Session:
         return said if event is None else f'{said}, "event": "{event}"'
 
     def _snapshot(self, t: float, sensed: Sensed, tau: FloatArray, wrench: FloatArray) -> Snapshot:
-        counts, newest = self._memory.counts, None if self._touches is None else self._touches.newest
-        goes_on = (newest,) if newest is not None and newest.open else ()
+        counts = self._memory.counts
         return Snapshot(
             self.name, t, sensed.q, tau, np.sqrt(sensed.variance), wrench, sensed.covariance,
-            (*self._over, *goes_on),
+            self.unshown,
             {
                 "taken": counts.taken, "late": counts.late + counts.repeated, "not_finite": counts.not_finite,
                 "dropped": self._outbox.dropped, "refused": self._malformed + self._limited,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -101,8 +101,10 @@ class _Stream:
         for touch in reading.contacts:
             self.contacts.see(touch)
 
-    def end(self) -> None:
+    def end(self, contacts: Sequence[Touch]) -> None:
         self.has_ended = True
+        for touch in contacts:
+            self.contacts.see(touch)
         self.contacts.end()
 
     def is_alive(self, now: float) -> bool:
@@ -166,12 +168,17 @@ class LivePage:
         if stream is self._seen():
             self._draw(stream, reading)
 
-    def end(self, name: str) -> None:
-        """Take note that a stream has ended: no force is drawn any more, and its last contact is over."""
+    def end(self, name: str, contacts: Sequence[Touch] = ()) -> None:
+        """Take note that a stream has ended: no force is drawn any more, and its last contact is over.
+
+        Parameters
+        ----------
+        contacts : of the stream since its last reading
+        """
         stream = self._streams.get(name)
         if stream is None:
             return
-        stream.end()
+        stream.end(contacts)
         if stream is self._seen():
             self._scene.hide_force()
 
