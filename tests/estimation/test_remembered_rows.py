@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from rough_arms import SETTINGS, rough_truth, slow_and_fast
 
 from tauhat.dynamics import TERMS, TorqueModel, base_parameters
-from tauhat.dynamics.terms import Coulomb, Dahl, GasSpring, Stribeck
+from tauhat.dynamics.terms import Coulomb, Dahl, GasSpring, LoadDahl, Stribeck, Thermal
 from tauhat.dynamics.terms.inertia import Inertia
 from tauhat.estimation.evidence import Evidence, collect_all
 from tauhat.estimation.remembered_rows import RememberedRows
 
 TRUTH = rough_truth(Stribeck(speeds=(0.13, 0.05)), keys="inertia,viscous,coulomb", Fv=0.6, Fc=(1.5, 0.8), Fs=1.0)
-LOGS = [slow_and_fast(TRUTH, seed=seed, noise=0.05, part=part) for seed, part in ((5, 1.0), (6, 0.3))]
+LONG = slow_and_fast(TRUTH, seed=5, noise=0.05, seconds=40.0)
+LOGS = [LONG.rows(900, LONG.n_t), slow_and_fast(TRUTH, seed=6, noise=0.05, part=0.3)]  # in motion, in three chunks
 
 
 def grams(evidence: Evidence) -> list[np.ndarray]:
@@ -27,7 +29,11 @@ def test_they_are_the_rows_of_the_recordings_whatever_came_before(most_blocks: i
     rows = RememberedRows(LOGS, SETTINGS)
     own = TRUTH.model
     models = [own, own.with_term(Stribeck(speeds=(0.4, 0.3))), own.with_term(Coulomb(widths=(0.1, 0.2))), own]
-    models.append(TorqueModel(robot=own.robot, terms=(Dahl(scales=(1.0, 2.0)), own.terms[0])))
+    inertia = tuple(np.arange(10.0 * own.robot.n_v))
+    load = LoadDahl(inertia=inertia)
+    models.append(TorqueModel(robot=own.robot, terms=(Dahl(scales=(1.0, 2.0)), load, own.terms[0])))
+    models.append(TorqueModel(robot=own.robot, terms=(own.terms[0], replace(load, inertia=inertia[::-1]))))
+    models.append(TorqueModel(robot=own.robot, terms=(own.terms[0], Thermal(times=(30.0, 40.0)))))
     for model in models:
         base = base_parameters(model)
         found = rows.gather(model, base, most_blocks)

@@ -143,8 +143,21 @@ def collect(
     RecordingError
         when the recording does not fit the model or no row is left.
     """
+    rows = filtered_rows(model, model.layout(base.independent), recording, processing, chunk=chunk)
+    return collected(model, base, recording, rows, most_blocks=most_blocks)
+
+
+def collected(
+    model: TorqueModel, base: BaseParameters, recording: Recording, rows: Iterable[Rows], *, most_blocks: int
+) -> Evidence:
+    """Return the evidence of one recording whose rows, `filtered_rows` of the base parameters, are at hand.
+
+    Raises
+    ------
+    ModelError
+        when there is no row.
+    """
     layout = model.layout(base.independent)
-    rows = filtered_rows(model, layout, recording, processing, chunk=chunk)
     blocks = tuple(_grown_blocks(layout, rows) if most_blocks > 1 else _one_block(layout, rows))
     log = f"{recording.name} {recording.t[0]} {recording.n_t}"  # windows of one file have the same name
     blocks = tuple(block.of_log(log) for block in blocks)

@@ -1,7 +1,8 @@
 """Filtered rows of a few recordings, remembered term by term: models that share a term share its columns.
 
 Settings are chosen by fitting one model after another to the same sample, and most of its terms stay as they are. Their
-columns are made and filtered once. What is kept is as long as the sample, so this is for samples alone.
+columns are made and filtered once, when they are first asked for. What is kept is as long as the sample, so this is for
+samples alone.
 """
 
 from __future__ import annotations
@@ -15,15 +16,17 @@ from tauhat.arrays import FloatArray, IntArray
 from tauhat.dynamics.base import BaseParameters
 from tauhat.dynamics.model import Layout, TorqueModel
 from tauhat.dynamics.terms.term import Term
-from tauhat.estimation.evidence import Evidence, evidence_from_rows
+from tauhat.estimation.evidence import Evidence, collected
 from tauhat.estimation.rows import Rows, filtered_rows
-from tauhat.recordings.processing import Processing, stretches
+from tauhat.recordings.processing import Processing, Stretch, stretches
 from tauhat.recordings.recording import Recording
 from tauhat.workers import merged_as_tree
 
 
 class RememberedRows:
-    """Evidence of recordings on one model after another, through the same filters; `gather` is a `Gather`.
+    """Evidence of recordings on models of one robot, one after another, through the same filters.
+
+    `gather` is a `Gather`.
 
     Parameters
     ----------
@@ -49,7 +52,7 @@ class RememberedRows:
         """
         layout = model.layout(base.independent)
         parts = (
-            evidence_from_rows(layout, base, log.rows(model, layout), name=log.name, most_blocks=most_blocks)
+            collected(model, base, log.recording, log.rows(model, layout), most_blocks=most_blocks)
             for log in self._logs
         )
         return merged_as_tree(Evidence.merged, parts)
@@ -66,9 +69,8 @@ class _Log:
     """One recording and what is known of it."""
 
     def __init__(self, recording: Recording, processing: Processing) -> None:
-        self.name = recording.name
-        self._recording, self._processing = recording, processing
-        self._motion = tuple(stretches(recording, processing))
+        self.recording, self._processing = recording, processing
+        self._motion: tuple[Stretch, ...] = ()
         self._known: dict[Term, _Known] = {}
         self._plain: Rows | None = None  # of the robot alone: time, torque and velocity
 
@@ -86,12 +88,13 @@ class _Log:
 
     def _made(self, model: TorqueModel, term: Term) -> _Known:
         """Return all columns of a term of the model, filtered."""
+        self._motion = self._motion or tuple(stretches(self.recording, self._processing))
         alone = TorqueModel(robot=model.robot, terms=(term,))
         layout = alone.layout()
-        pieces = list(filtered_rows(alone, layout, self._recording, self._processing, motion=self._motion))
+        pieces = list(filtered_rows(alone, layout, self.recording, self._processing, motion=self._motion))
         places = tuple(target for _, target in layout.sources[0])
         if not pieces:
             return _Known(np.zeros((layout.parameters.size, 0)), places)
         whole = Rows(*(np.concatenate(part, axis=-1) for part in zip(*pieces, strict=True)))
-        self._plain = whole._replace(columns=whole.columns[:0])
+        self._plain = whole._replace(columns=np.zeros((0, whole.t.size)))
         return _Known(whole.columns, places)
