@@ -108,7 +108,7 @@ def test_a_pass_in_air_is_taken_where_the_job_will_be(arm, models):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Misled(ForceReader):
-    """A reader whose drives have an offset that no model knows."""
+    """A reader whose drives have an offset that no model knows, one on the way down and another later."""
 
     inner: ForceReader
     offset: np.ndarray
@@ -117,25 +117,28 @@ class Misled(ForceReader):
         return self.inner.start()
 
     def read(self, memory, sample, place):
-        return self.inner.read(memory, sample._replace(tau=sample.tau + self.offset), place)
+        return self.inner.read(
+            memory, sample._replace(tau=sample.tau + (1.0 if place.down else -0.7) * self.offset), place
+        )
 
 
 def test_what_the_same_job_shows_in_air_is_no_force_on_the_way_down_nor_in_the_passes(arm, models):
     scene, offset = Scene(0, "flat", "cold"), np.array([0.0, 9.0, 6.0, 0.0, 0.0, 0.0])
     cell, job = arm.cell(scene, models.warm), arm.job(scene)
     air = arm.air(scene, cell, job)
-    seen = air._replace(recording=replace(air.recording, tau=air.recording.tau + offset))
-    felt = {}
+    offsets = np.where(air.down[:, None], offset, -0.7 * offset)
+    seen = air._replace(recording=replace(air.recording, tau=air.recording.tau + offsets))
+    deepest = []
     for name in (NO_WARMTH, f"{NO_WARMTH}, pass in air"):
         reader, source = reading_of(name, models.estimates, seen, cell)
         asked = replace(job, polisher=replace(job.polisher, source=source))
         running = start_cell(in_the_air(cell), job.beginning, rng=arm.rng_of_run(scene))
         log = asked.done_in(running, Misled(inner=reader, offset=offset))
-        felt[name] = log.read[: int(1.5 / job.polisher.period)]
-        assert log.reason == "surface_misplaced"
-    without, zeroed = felt.values()
-    assert np.abs(without).mean() > 8.0
-    assert np.abs(zeroed).max() < job.polisher.contact.threshold
+        deepest.append(log.depth.max())
+        felt = log.read[int(0.6 / job.polisher.period) : int(1.6 / job.polisher.period)]
+    assert deepest[0] < -job.polisher.limits.misplaced, "contact is felt at once"
+    assert deepest[1] >= job.polisher.limits.deepest, "none is felt at all"
+    assert np.abs(felt).max() < job.polisher.contact.threshold
     reader, source = reading_of(f"{NO_WARMTH}, pass in air", models.estimates, seen, cell)
     asked = replace(job, polisher=replace(job.polisher, source=source))
     running = start_cell(cell, job.beginning, rng=arm.rng_of_run(scene))

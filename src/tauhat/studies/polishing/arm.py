@@ -110,7 +110,7 @@ class Arm:
         return Job(polisher=polisher, path=path, way_in=work.way_in)
 
     def air(self, scene: Scene, cell: Cell, job: Job) -> AirLog:
-        """Return the log of the same motion in air, in the same cell and at the same temperature."""
+        """Return the log of the same job in air, in the same cell and at the same temperature."""
         running = start_cell(in_the_air(cell), job.beginning, rng=self._rng(_RUN, 0, *_numbers(scene)))
         return job.in_air(running)
 

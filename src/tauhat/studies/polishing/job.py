@@ -25,7 +25,7 @@ _PEAK = 1.875  # largest over mean speed of a way with the least jerk
 class AirLog(NamedTuple):
     """The log of a job in air.
 
-    recording : way in, way down, and passes
+    recording : way up and in, way down, a wait, and passes
     progress : (n,) way of the tool since the passes began [m]
     down : (n,) whether it is on its way down
     """
@@ -93,13 +93,14 @@ class Job:
         return JobLog(t, s, depth, passing, true, read, std, state.phase, state.reason)
 
     def in_air(self, cell: RunningCell) -> AirLog:
-        """Return the log of the job without contact: way in, way down and passes, as high above it as it begins."""
+        """Return the log of the job without contact, as high above it as it begins; then come back to the beginning."""
         task, high = self.polisher.task, self.polisher.limits.height
         come = list(self._moved(cell, (-task.half, -high), (-task.half, -2.0 * high)))
         come += [sample for sample, _ in self._way(cell, self.way_in, passes=2, height=2.0 * high)]
         down = list(self._down(cell))
         stood = [cell.advance(*self.path.at(-task.half, 0.0, -high, 0.0)) for _ in range(self._periods(task.settle))]
         passed = list(self._way(cell, task.feed, passes=task.passes, height=high))
+        self._back(cell, task.half if task.passes % 2 else -task.half, -high)
         samples = [*come, *down, *stood, *(sample for sample, _ in passed)]
         t, q, tau = (np.array([getattr(sample, name) for sample in samples]) for name in ("t", "q", "tau"))
         log = Recording(t=t, q=q, tau=tau, joint_names=self.path.robot.joint_names, name="in air")
@@ -109,8 +110,10 @@ class Job:
 
     def come_back(self, cell: RunningCell, log: JobLog) -> None:
         """Move above the surface from where a job ended to where the next one begins, gently."""
-        ended = float(log.s[-1]), float(log.depth[-1])
-        for _ in self._moved(cell, ended, (-self.polisher.task.half, -self.polisher.limits.height)):
+        self._back(cell, float(log.s[-1]), float(log.depth[-1]))
+
+    def _back(self, cell: RunningCell, s: float, depth: float) -> None:
+        for _ in self._moved(cell, (s, depth), (-self.polisher.task.half, -self.polisher.limits.height)):
             pass
 
     def _moved(self, cell: RunningCell, start: tuple[float, float], end: tuple[float, float]) -> Iterator[CellSample]:

@@ -74,7 +74,8 @@ class NoReading(ForceReader):
 class AirZero(NamedTuple):
     """The external torque that a job in air shows.
 
-    down : (n_v,) its mean while the tool comes down; what swings about it never swings alike twice [Nm or N]
+    down : (n_v,) its mean over the second half of the way down, when friction has built up; what swings about it does
+        not swing alike twice [Nm or N]
     passes : by the way of the tool since they began
     """
 
