@@ -177,7 +177,8 @@ def _channels(options: Options, source: UniversalRobot | None) -> Channels:
 
 def _called(name: str, count: int) -> str:
     """Return what a count of the end is called: nouns in their number, the rest as they are."""
-    return name[:-1] if count == 1 and name in {"clients", "restarts", "unknown_datagrams"} else name.replace("_", " ")
+    words = name.replace("_", " ")
+    return words[:-1] if count == 1 and words in {"clients", "restarts", "unknown datagrams"} else words
 
 
 def _page(known: Prepared, access: Access, port: int) -> Page:
