@@ -142,7 +142,7 @@ def test_what_the_same_job_shows_in_air_is_no_force_on_the_way_down_nor_in_the_p
     reader, source = reading_of(f"{NO_WARMTH}, pass in air", models.estimates, seen, cell)
     asked = replace(job, polisher=replace(job.polisher, source=source))
     running = start_cell(cell, job.beginning, rng=arm.rng_of_run(scene))
-    assert judged(_blank(), asked.done_in(running, Misled(inner=reader, offset=offset)), 30.0).rms < 0.2
+    assert judged(_blank(), asked.done_in(running, Misled(inner=reader, offset=offset)), 30.0).rms < 0.1
 
 
 def test_hard_arms_have_changed_since_the_calibration_and_easy_ones_have_not(arm):

@@ -143,14 +143,25 @@ def collect(
     RecordingError
         when the recording does not fit the model or no row is left.
     """
-    rows = filtered_rows(model, model.layout(base.independent), recording, processing, chunk=chunk)
-    return collected(model, base, recording, rows, most_blocks=most_blocks)
+    return collected(
+        model, base, recording, most_blocks=most_blocks,
+        rows_of=lambda layout: filtered_rows(model, layout, recording, processing, chunk=chunk),
+    )  # fmt: skip
 
 
 def collected(
-    model: TorqueModel, base: BaseParameters, recording: Recording, rows: Iterable[Rows], *, most_blocks: int
+    model: TorqueModel,
+    base: BaseParameters,
+    recording: Recording,
+    *,
+    rows_of: Callable[[Layout], Iterable[Rows]],
+    most_blocks: int,
 ) -> Evidence:
-    """Return the evidence of one recording whose rows, `filtered_rows` of the base parameters, are at hand.
+    """Return the evidence of one recording whose rows come from elsewhere.
+
+    Parameters
+    ----------
+    rows_of : makes the `filtered_rows` of the recording in a layout
 
     Raises
     ------
@@ -158,6 +169,7 @@ def collected(
         when there is no row.
     """
     layout = model.layout(base.independent)
+    rows = rows_of(layout)
     blocks = tuple(_grown_blocks(layout, rows) if most_blocks > 1 else _one_block(layout, rows))
     log = f"{recording.name} {recording.t[0]} {recording.n_t}"  # windows of one file have the same name
     blocks = tuple(block.of_log(log) for block in blocks)

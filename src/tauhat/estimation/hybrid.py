@@ -66,8 +66,8 @@ class HybridLeastSquares(ReweightedLeastSquares):
 
     def _reshaped(self, problem: Problem) -> TorqueModel:
         """Return the model with every chosen shape looked at again on the rows as the fit weighs them."""
-        model, shaped = problem.model, [term for term in problem.model.terms if isinstance(term, Shaped)]
-        shaped = [term for term in shaped if term.shape]
+        model = problem.model
+        shaped = [term for term in model.terms if isinstance(term, Shaped) and term.shape]
         if not shaped:
             return model
         gather = self._gathering(problem)

@@ -29,20 +29,15 @@ _SWEEPS = 2
 _RIDGE = 1e-7  # on columns of unit norm: a form that the motion never shows must not spoil the factor
 
 
-def chosen_form(
-    model: TorqueModel,
-    base: BaseParameters,
-    forms: Sequence[Shaped],
-    gather: Gather,
-) -> Shaped:
+def chosen_form(model: TorqueModel, base: BaseParameters, forms: Sequence[Shaped], gather: Gather) -> Shaped:
     """Return the mixture of `forms` of one of the model's terms that leaves the least residual.
+
+    The shape is then looked at more closely around the best of the forms.
 
     Parameters
     ----------
     base : of the model with the term in any of its forms
     gather : makes the evidence
-
-    The shape is then looked at more closely around the best of the forms.
     """
     best = _mixture(model, base, forms, gather)
     closer = [best.with_shape([factor * value for value in best.shape]) for factor in FINER]

@@ -22,7 +22,7 @@ from tauhat.estimation.evidence import Gather, gathering
 from tauhat.estimation.iterating import first_loaded
 from tauhat.estimation.least_squares import WeightedLeastSquares
 from tauhat.estimation.problem import Problem
-from tauhat.estimation.remembered_rows import RememberedRows
+from tauhat.estimation.rows_by_term import RowsByTerm
 from tauhat.estimation.shape_uncertainty import nearer_shapes
 from tauhat.estimation.shapes import chosen_form
 from tauhat.estimation.solution import joint_residuals
@@ -65,7 +65,7 @@ def tuned(
 def tuned_through(model: TorqueModel, sample: Sequence[Recording], processing: Processing) -> TorqueModel:
     """Return the model with its shapes chosen on a sample of the recordings, through filters that are settled."""
     model = first_loaded(_informed(model, sample), sample, processing, WeightedLeastSquares())
-    return _shaped(model, base_parameters(model), sample, RememberedRows(sample, processing))
+    return _shaped(model, base_parameters(model), sample, RowsByTerm(sample, processing))
 
 
 def tuned_from(model: TorqueModel, sample: Sequence[Recording], settings: Processing) -> tuple[TorqueModel, Processing]:
@@ -82,7 +82,7 @@ def tuned_from(model: TorqueModel, sample: Sequence[Recording], settings: Proces
     """
     model = first_loaded(_informed(model, sample), sample, settings, WeightedLeastSquares())
     base = base_parameters(model)
-    rows = RememberedRows(sample, settings)
+    rows = RowsByTerm(sample, settings)
     shaped = _shaped(model, base, sample, rows)
     delay = position_delay(shaped, base, sample, settings)
     if delay.certain:
@@ -95,7 +95,7 @@ def tuned_from(model: TorqueModel, sample: Sequence[Recording], settings: Proces
     settings = _best_processing(shaped, base, sample, settings)
     if settings == rows.processing:
         return shaped, settings
-    return _shaped(model, base, sample, RememberedRows(sample, settings)), settings
+    return _shaped(model, base, sample, RowsByTerm(sample, settings)), settings
 
 
 def _residual_level(model: TorqueModel, base: BaseParameters, gather: Gather) -> float:
@@ -146,9 +146,7 @@ def _facts(recordings: Sequence[Recording]) -> Facts:
     return Facts(top_speeds(recordings), shared, np.mean(means, axis=0) if len(means) == len(recordings) else None)
 
 
-def _shaped(
-    model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], rows: RememberedRows
-) -> TorqueModel:
+def _shaped(model: TorqueModel, base: BaseParameters, recordings: Sequence[Recording], rows: RowsByTerm) -> TorqueModel:
     """Return the model with every open shape chosen; terms are visited in turn until none of them changes."""
     facts = _facts(recordings)
     open_terms = [every for term in model.terms if len(every := term.candidates(facts)) > 1]
@@ -162,7 +160,7 @@ def _shaped(
     return _refined(model, base, {forms[0].key for forms in choices}, rows)
 
 
-def _refined(model: TorqueModel, base: BaseParameters, keys: Collection[str], rows: RememberedRows) -> TorqueModel:
+def _refined(model: TorqueModel, base: BaseParameters, keys: Collection[str], rows: RowsByTerm) -> TorqueModel:
     """Return the model with the shapes of the terms `keys` taken off the grid, as long as that lowers the residual."""
     level = _residual_level(model, base, rows.gather) if keys else 0.0
     for _ in range(_STEPS if keys else 0):

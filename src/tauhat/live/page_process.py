@@ -256,10 +256,11 @@ def _follow(connection: Connection, page: LivePage) -> None:
         ready = wait(ends, timeout=_IDLE)
         if connection in ready:
             told = connection.recv()
-            if len(told) == len(Snapshot._fields):
-                page.show(Snapshot(*told))
-            else:
-                page.end(*told)
+            match told:
+                case (stream, contacts):
+                    page.end(stream, contacts)
+                case _:
+                    page.show(Snapshot(*told))
             connection.send_bytes(_TAKEN)
         elif ready:
             return

@@ -112,9 +112,7 @@ def run(options: Options) -> None:
     with working("preparing"):
         rate = _rate(options, source)
         known = prepared(options, sensor_of(options, rate))
-        page = (
-            None if options.no_page else _page(known, channels.access, _PAGE if options.page is None else options.page)
-        )
+        page = None if options.no_page else _page(known, channels.access, options.page)
     limits = Limits(clients=options.clients)
     service = Service(
         sensor=known.sensor, thresholds=known.thresholds, limits=limits, feed=Feed(page),
@@ -181,11 +179,11 @@ def _called(name: str, count: int) -> str:
     return words[:-1] if count == 1 and words in {"clients", "restarts", "unknown datagrams"} else words
 
 
-def _page(known: Prepared, access: Access, port: int) -> Page:
+def _page(known: Prepared, access: Access, port: int | None) -> Page:
     from tauhat.live.page_process import start_page
 
-    solver = known.sensor.solver
-    return start_page(solver.robot, frame=str(solver.frame), axes=solver.axes, port=port, access=access)
+    solver, at = known.sensor.solver, _PAGE if port is None else port
+    return start_page(solver.robot, frame=str(solver.frame), axes=solver.axes, port=at, access=access)
 
 
 def _text(document: Mapping[str, Any]) -> str:

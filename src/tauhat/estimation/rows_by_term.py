@@ -8,6 +8,7 @@ samples alone.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from tauhat.recordings.recording import Recording
 from tauhat.workers import merged_as_tree
 
 
-class RememberedRows:
+class RowsByTerm:
     """Evidence of recordings on models of one robot, one after another, through the same filters.
 
     `gather` is a `Gather`.
@@ -50,9 +51,8 @@ class RememberedRows:
         ModelError
             when no row is left.
         """
-        layout = model.layout(base.independent)
         parts = (
-            collected(model, base, log.recording, log.rows(model, layout), most_blocks=most_blocks)
+            collected(model, base, log.recording, rows_of=partial(log.rows, model), most_blocks=most_blocks)
             for log in self._logs
         )
         return merged_as_tree(Evidence.merged, parts)

@@ -13,7 +13,7 @@ from tauhat.dynamics import TERMS, TorqueModel, base_parameters
 from tauhat.dynamics.terms import Coulomb, Dahl, GasSpring, LoadDahl, Stribeck, Thermal
 from tauhat.dynamics.terms.inertia import Inertia
 from tauhat.estimation.evidence import Evidence, collect_all
-from tauhat.estimation.remembered_rows import RememberedRows
+from tauhat.estimation.rows_by_term import RowsByTerm
 
 TRUTH = rough_truth(Stribeck(speeds=(0.13, 0.05)), keys="inertia,viscous,coulomb", Fv=0.6, Fc=(1.5, 0.8), Fs=1.0)
 LONG = slow_and_fast(TRUTH, seed=5, noise=0.05, seconds=40.0)
@@ -26,7 +26,7 @@ def grams(evidence: Evidence) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("most_blocks", [1, 64])
 def test_they_are_the_rows_of_the_recordings_whatever_came_before(most_blocks: int) -> None:
-    rows = RememberedRows(LOGS, SETTINGS)
+    rows = RowsByTerm(LOGS, SETTINGS)
     own = TRUTH.model
     models = [own, own.with_term(Stribeck(speeds=(0.4, 0.3))), own.with_term(Coulomb(widths=(0.1, 0.2))), own]
     inertia = tuple(np.arange(10.0 * own.robot.n_v))
@@ -50,7 +50,7 @@ def test_a_term_that_stays_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None
     made: Counter[str] = Counter()
     columns = Inertia.columns
     monkeypatch.setattr(Inertia, "columns", lambda *args: made.update(["inertia"]) or columns(*args))
-    rows, base = RememberedRows(LOGS[:1], SETTINGS), base_parameters(TRUTH.model)
+    rows, base = RowsByTerm(LOGS[:1], SETTINGS), base_parameters(TRUTH.model)
     rows.gather(TRUTH.model, base, 1)
     once = made["inertia"]
     for speed in (0.1, 0.2, 0.3):
